@@ -1,0 +1,352 @@
+//! The robot's settings (SI units and degrees) and the robot made from them.
+
+use core::fmt;
+
+use crate::kinematics::{Elbow, Scara, ScaraConfig, ScaraError};
+use crate::prefilter::{Kernel, Kind, Prefilter, PrefilterConfig, PrefilterError, Response};
+
+/// Everything that a builder sets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RobotConfig {
+    /// Arm lengths, elbow and joint limits.
+    pub scara: ScaraConfig,
+    /// Which vibration to suppress, and how.
+    pub prefilter: PrefilterConfig,
+    /// Corner tolerance in mm where the program gives none, 0 to 100; 0 stops at corners.
+    pub corner_tolerance_mm: f32,
+    /// Feedrate of `G0` in mm/s, above 0 to 10 000.
+    pub rapid_mm_s: f32,
+    /// Fastest feedrate in mm/s, above 0 to 10 000; a program that asks for more gets this.
+    pub feed_limit_mm_s: f32,
+    /// Fastest turn of the yaw in °/s, above 0 to 10 000.
+    pub yaw_limit_deg_s: f32,
+}
+
+impl Default for RobotConfig {
+    fn default() -> Self {
+        Self {
+            scara: ScaraConfig::default(),
+            prefilter: PrefilterConfig::default(),
+            corner_tolerance_mm: 0.5,
+            rapid_mm_s: 160.0,
+            feed_limit_mm_s: 1000.0,
+            yaw_limit_deg_s: 360.0,
+        }
+    }
+}
+
+/// Why a robot's settings are refused; names the setting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ConfigError {
+    /// The arm's geometry.
+    Scara(ScaraError),
+    /// The prefilter.
+    Prefilter(PrefilterError),
+    /// A plain number is out of its range.
+    Range {
+        /// Name of the setting.
+        name: &'static str,
+        /// What was given.
+        value: f32,
+        /// Lowest value.
+        low: f32,
+        /// Highest value.
+        high: f32,
+    },
+}
+
+impl From<ScaraError> for ConfigError {
+    fn from(error: ScaraError) -> Self {
+        Self::Scara(error)
+    }
+}
+
+impl From<PrefilterError> for ConfigError {
+    fn from(error: PrefilterError) -> Self {
+        Self::Prefilter(error)
+    }
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Scara(error) => error.fmt(f),
+            Self::Prefilter(error) => error.fmt(f),
+            Self::Range {
+                name,
+                value,
+                low,
+                high,
+            } => write!(
+                f,
+                "the setting {name} is {value}, outside {low} to {high}: give a value within that range"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+/// A robot with validated settings, in the units that planning and tick work in.
+#[derive(Clone, Debug)]
+pub struct Robot {
+    /// The settings that it was made from.
+    pub config: RobotConfig,
+    /// Kinematics of the arm.
+    pub scara: Scara,
+    /// The prefilter in seconds.
+    pub prefilter: Prefilter,
+    /// The prefilter in integer taps.
+    pub kernel: Kernel,
+    /// What an acceleration looks like from its start.
+    pub accelerating: Response,
+    /// What a deceleration looks like from its end.
+    pub decelerating: Response,
+}
+
+impl Robot {
+    /// Validates the settings.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first setting that is out of range.
+    pub fn new(config: &RobotConfig) -> Result<Self, ConfigError> {
+        let checks = [
+            ("tolerance", config.corner_tolerance_mm, 0.0, 100.0),
+            ("rapid", config.rapid_mm_s, 0.001, 10_000.0),
+            ("feed-limit", config.feed_limit_mm_s, 0.001, 10_000.0),
+            ("yaw-limit", config.yaw_limit_deg_s, 0.001, 10_000.0),
+        ];
+        for (name, value, low, high) in checks {
+            if !(low..=high).contains(&value) {
+                return Err(ConfigError::Range {
+                    name,
+                    value,
+                    low,
+                    high,
+                });
+            }
+        }
+        let prefilter = Prefilter::new(&config.prefilter)?;
+        Ok(Self {
+            config: *config,
+            scara: Scara::new(&config.scara)?,
+            kernel: Kernel::new(&prefilter)?,
+            accelerating: prefilter.response(),
+            decelerating: prefilter.reversed_response(),
+            prefilter,
+        })
+    }
+}
+
+/// Why a `name=value` setting is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SettingError {
+    /// There is no setting of that name.
+    Unknown,
+    /// The value is not a number, or none of the names that this setting takes.
+    Value,
+}
+
+impl fmt::Display for SettingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Unknown => "there is no setting of that name: see the table of settings",
+            Self::Value => "the setting's value cannot be read: give a number or one of its names",
+        })
+    }
+}
+
+impl core::error::Error for SettingError {}
+
+/// A setting's place in the configuration.
+enum Slot<'a> {
+    Number(&'a mut f32),
+    Prefilter(&'a mut Kind),
+    Elbow(&'a mut Elbow),
+}
+
+/// The value of a setting, as text shows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SettingValue {
+    /// A number in the setting's unit.
+    Number(f32),
+    /// One of the setting's names.
+    Name(&'static str),
+}
+
+impl fmt::Display for SettingValue {
+    /// Written so that it reads back as exactly the same value.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(value) => value.fmt(f),
+            Self::Name(name) => f.write_str(name),
+        }
+    }
+}
+
+impl RobotConfig {
+    /// Names of all settings, in groups whose values must fit each other: lengths in mm, angles
+    /// in °, the frequency in Hz, feedrates in mm/s, the yaw limit in °/s.
+    pub const GROUPS: [&'static [&'static str]; 10] = [
+        &["link1", "link2"],
+        &["elbow", "joint2-min", "joint2-max", "singularity-margin"],
+        &["joint1-min", "joint1-max"],
+        &["joint3-min", "joint3-max"],
+        &["joint4-min", "joint4-max"],
+        &["prefilter", "frequency", "damping"],
+        &["tolerance"],
+        &["rapid"],
+        &["feed-limit"],
+        &["yaw-limit"],
+    ];
+
+    /// Sets values from `name=value` texts between blanks, as a `$` line carries them.
+    ///
+    /// Their ranges are checked when a [`Robot`] is made.
+    ///
+    /// # Errors
+    /// [`SettingError`] if a name or a value cannot be read; nothing is changed then.
+    pub fn set_all(&mut self, text: &str) -> Result<(), SettingError> {
+        let mut changed = *self;
+        for pair in text.split_ascii_whitespace() {
+            changed.set(pair)?;
+        }
+        *self = changed;
+        Ok(())
+    }
+
+    /// Sets one value from a `name=value` text.
+    ///
+    /// The value's range is checked when a [`Robot`] is made.
+    ///
+    /// # Errors
+    /// [`SettingError`] if the name or the value cannot be read; nothing is changed then.
+    pub fn set(&mut self, text: &str) -> Result<(), SettingError> {
+        let (name, value) = text.split_once('=').ok_or(SettingError::Value)?;
+        let value = value.trim();
+        match self.slot(name.trim()).ok_or(SettingError::Unknown)? {
+            Slot::Number(number) => *number = value.parse().map_err(|_| SettingError::Value)?,
+            Slot::Prefilter(kind) => *kind = Kind::from_name(value).ok_or(SettingError::Value)?,
+            Slot::Elbow(elbow) => *elbow = elbow_named(value).ok_or(SettingError::Value)?,
+        }
+        Ok(())
+    }
+
+    /// The value of a setting; `None` if there is no setting of that name.
+    #[must_use]
+    pub fn value(&self, name: &str) -> Option<SettingValue> {
+        let mut copy = *self;
+        Some(match copy.slot(name)? {
+            Slot::Number(number) => SettingValue::Number(*number),
+            Slot::Prefilter(kind) => SettingValue::Name(kind.name()),
+            Slot::Elbow(elbow) => SettingValue::Name(elbow_name(*elbow)),
+        })
+    }
+
+    fn slot(&mut self, name: &str) -> Option<Slot<'_>> {
+        let [joint1, joint2, joint3, joint4] = &mut self.scara.joint_limits;
+        Some(match name {
+            "prefilter" => Slot::Prefilter(&mut self.prefilter.kind),
+            "elbow" => Slot::Elbow(&mut self.scara.elbow),
+            "link1" => Slot::Number(&mut self.scara.link1_mm),
+            "link2" => Slot::Number(&mut self.scara.link2_mm),
+            "singularity-margin" => Slot::Number(&mut self.scara.singularity_margin_deg),
+            "joint1-min" => Slot::Number(&mut joint1.min),
+            "joint1-max" => Slot::Number(&mut joint1.max),
+            "joint2-min" => Slot::Number(&mut joint2.min),
+            "joint2-max" => Slot::Number(&mut joint2.max),
+            "joint3-min" => Slot::Number(&mut joint3.min),
+            "joint3-max" => Slot::Number(&mut joint3.max),
+            "joint4-min" => Slot::Number(&mut joint4.min),
+            "joint4-max" => Slot::Number(&mut joint4.max),
+            "frequency" => Slot::Number(&mut self.prefilter.frequency_hz),
+            "damping" => Slot::Number(&mut self.prefilter.damping),
+            "tolerance" => Slot::Number(&mut self.corner_tolerance_mm),
+            "rapid" => Slot::Number(&mut self.rapid_mm_s),
+            "feed-limit" => Slot::Number(&mut self.feed_limit_mm_s),
+            "yaw-limit" => Slot::Number(&mut self.yaw_limit_deg_s),
+            _ => return None,
+        })
+    }
+}
+
+fn elbow_name(elbow: Elbow) -> &'static str {
+    match elbow {
+        Elbow::Left => "left",
+        Elbow::Right => "right",
+    }
+}
+
+fn elbow_named(name: &str) -> Option<Elbow> {
+    [Elbow::Left, Elbow::Right]
+        .into_iter()
+        .find(|elbow| elbow_name(*elbow).eq_ignore_ascii_case(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::format;
+
+    #[test]
+    fn every_setting_reads_back_as_itself() {
+        let config = RobotConfig::default();
+        for name in RobotConfig::GROUPS.into_iter().flatten() {
+            let mut copy = RobotConfig::default();
+            let value = config.value(name).expect(name);
+            copy.set(&format!("{name}={value}")).expect(name);
+            assert_eq!(copy, config);
+        }
+    }
+
+    #[test]
+    fn a_line_of_settings_is_taken_as_a_whole() {
+        let mut config = RobotConfig::default();
+        config.set_all("link1=1900  link2=90").unwrap();
+        assert_eq!(
+            (config.scara.link1_mm, config.scara.link2_mm),
+            (1900.0, 90.0)
+        );
+        let before = config;
+        assert_eq!(
+            config.set_all("link1=100 speed=3"),
+            Err(SettingError::Unknown)
+        );
+        assert_eq!(config, before);
+    }
+
+    #[test]
+    fn settings_that_cannot_be_read_change_nothing() {
+        let mut config = RobotConfig::default();
+        for (text, error) in [
+            ("speed=3", SettingError::Unknown),
+            ("frequency", SettingError::Value),
+            ("frequency=", SettingError::Value),
+            ("frequency=six", SettingError::Value),
+            ("prefilter=zvx", SettingError::Value),
+            ("elbow=up", SettingError::Value),
+        ] {
+            assert_eq!(config.set(text), Err(error), "{text}");
+        }
+        assert_eq!(config, RobotConfig::default());
+    }
+
+    #[test]
+    fn a_robot_is_refused_by_the_name_of_its_setting() {
+        for (text, name) in [
+            ("tolerance=-1", "tolerance"),
+            ("rapid=0", "rapid"),
+            ("feed-limit=NaN", "feed-limit"),
+            ("yaw-limit=inf", "yaw-limit"),
+            ("frequency=0", "frequency"),
+            ("frequency=1.5", "long"),
+            ("damping=1", "damping"),
+            ("link1=-200", "link"),
+        ] {
+            let mut config = RobotConfig::default();
+            config.set(text).unwrap();
+            let message = format!("{}", Robot::new(&config).expect_err(text));
+            assert!(message.contains(name), "{text}: {message}");
+        }
+    }
+}

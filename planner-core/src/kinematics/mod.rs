@@ -1,0 +1,16 @@
+//! From where the tool is to where the joints are, and back.
+//!
+//! [`ScaraConfig`] (millimetres, degrees) is validated once into a [`Scara`] (machine units),
+//! which every tick maps poses to joint states: [`Scara::joint_state`] cannot fail. What could
+//! fail, a path that leaves the workspace, is found before motion by [`Scara::check`] for a
+//! pose and [`Scara::check_segment`] for everything between two.
+
+mod config;
+mod pose_check;
+mod scara;
+mod segment_check;
+
+pub use config::{Elbow, JointRange, ScaraConfig, ScaraError};
+pub use pose_check::PoseError;
+pub use scara::Scara;
+pub use segment_check::{Curve, SegmentError, Travel};

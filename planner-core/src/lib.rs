@@ -1,0 +1,22 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+mod arcs;
+pub mod config;
+pub mod corner;
+pub mod gcode;
+pub mod kinematics;
+pub mod math;
+pub mod motion;
+pub mod path;
+pub mod planner;
+pub mod pose;
+pub mod prefilter;
+pub mod raw;
+mod schedule;
+pub mod telemetry;
+pub mod units;
+mod walker;

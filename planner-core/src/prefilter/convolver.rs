@@ -1,0 +1,116 @@
+//! The prefilter at run time: a delay line and, for each box, a running sum.
+
+use super::MAX_STAGES;
+use super::kernel::{Kernel, SLOTS, Tap, Taps, WEIGHT_BITS};
+
+/// The output has this many bits below the input's.
+pub const FINE_BITS: u32 = 13;
+
+/// Filters `AXES` coordinates that share one prefilter, a sample a tick.
+///
+/// All stages live in one delay line: each stage's samples end where the next one's begin,
+/// and the whole line moves by one slot a tick. Inputs are positions; with weights that sum
+/// to exactly one, the output at rest equals the input bit for bit, for ever.
+///
+/// Cost on a Cortex-M4F: about 15 instructions a tap and axis, whatever the length.
+#[derive(Clone, Debug)]
+pub struct Convolver<const AXES: usize> {
+    line: [[i32; AXES]; SLOTS],
+    /// Slot of the newest sample of the first stage.
+    head: usize,
+    /// Running sums of the boxes, by stage, in 2^-30 of the input's unit.
+    sums: [[i64; AXES]; MAX_STAGES],
+    /// Samples from before the reset read as this.
+    rest: [i32; AXES],
+    /// Samples since the reset.
+    age: usize,
+}
+
+impl<const AXES: usize> Default for Convolver<AXES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const AXES: usize> Convolver<AXES> {
+    /// A convolver at rest at zero.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            line: [[0; AXES]; SLOTS],
+            head: 0,
+            sums: [[0; AXES]; MAX_STAGES],
+            rest: [0; AXES],
+            age: 0,
+        }
+    }
+
+    /// Puts the filter to rest at a value, as if that had been the input for ever.
+    ///
+    /// Constant cost: the delay line is not touched, its old samples just no longer count.
+    pub fn reset(&mut self, rest: [i32; AXES]) {
+        self.rest = rest;
+        self.age = 0;
+        self.sums = [rest.map(|value| i64::from(value) << WEIGHT_BITS); MAX_STAGES];
+    }
+
+    /// Takes the input of this tick, returns the output in 2^-[`FINE_BITS`] of its unit.
+    #[must_use]
+    pub fn process(&mut self, kernel: &Kernel, input: [i32; AXES]) -> [i64; AXES] {
+        self.head = self.head.wrapping_sub(1);
+        let mut total = input.map(|value| i64::from(value) << WEIGHT_BITS);
+        for (stage, sums) in kernel.stages.iter().zip(&mut self.sums) {
+            let newest = self.head.wrapping_add(usize::from(stage.first_slot)) % SLOTS;
+            self.line[newest] = total.map(|value| round_off(value, WEIGHT_BITS) as i32);
+            let delayed = Delayed {
+                line: &self.line,
+                head: self.head,
+                age: self.age,
+                rest: &self.rest,
+            };
+            total = match &stage.taps {
+                Taps::Zv(taps) => delayed.weighted(taps, [0; AXES]),
+                Taps::Impulses(taps) => delayed.weighted(taps, [0; AXES]),
+                Taps::Box(taps) => {
+                    *sums = delayed.weighted(taps, *sums);
+                    *sums
+                }
+            };
+        }
+        self.age = self.age.saturating_add(1);
+        total.map(|value| round_off(value, WEIGHT_BITS - FINE_BITS))
+    }
+}
+
+/// The delay line as a stage reads it.
+struct Delayed<'a, const AXES: usize> {
+    line: &'a [[i32; AXES]; SLOTS],
+    head: usize,
+    age: usize,
+    rest: &'a [i32; AXES],
+}
+
+impl<const AXES: usize> Delayed<'_, AXES> {
+    /// `sum` and the weighted samples, in 2^-30 of the input's unit.
+    fn weighted<const TAPS: usize>(&self, taps: &[Tap; TAPS], mut sum: [i64; AXES]) -> [i64; AXES] {
+        let samples: [&[i32; AXES]; TAPS] = core::array::from_fn(|i| {
+            let tap = &taps[i];
+            if usize::from(tap.delay) <= self.age {
+                &self.line[self.head.wrapping_add(usize::from(tap.slot)) % SLOTS]
+            } else {
+                self.rest
+            }
+        });
+        for (axis, sum) in sum.iter_mut().enumerate() {
+            for (sample, tap) in samples.iter().zip(taps) {
+                *sum = sum.wrapping_add(i64::from(sample[axis]) * i64::from(tap.weight));
+            }
+        }
+        sum
+    }
+}
+
+/// Rounds to nearest while dropping `bits` bits.
+const fn round_off(value: i64, bits: u32) -> i64 {
+    value.wrapping_add(1 << (bits - 1)) >> bits
+}

@@ -1,0 +1,179 @@
+//! The raw path in machine units: what the planner hands to the tick.
+//!
+//! Time counts in 2^-32 ticks, so that segments begin and end between ticks; progress along
+//! a segment counts in 2^-62 of the segment; an arc is its chord, which is filtered with the
+//! lines, plus its bow, which is a function of the filtered progress.
+
+use heapless::spsc::{Consumer, Producer, Queue};
+
+use crate::math::sin_cos;
+use crate::path::PathSegment;
+use crate::path::{Arc, Shape};
+use crate::pose::{AXES, Pose};
+use crate::units::TICK_HZ;
+
+/// Segments that can wait between the planner and the tick: the look-ahead.
+///
+/// 64 segments of 0.5 mm at 160 mm/s last 0.2 s, longer than a serial line hesitates.
+pub const LOOKAHEAD: usize = 64;
+
+/// The queue between planner and tick; one place stays empty to tell full from empty.
+pub type SegmentQueue = Queue<RawSegment, { LOOKAHEAD + 1 }>;
+
+/// The planner's end of the queue.
+pub type SegmentProducer<'q> = Producer<'q, RawSegment>;
+
+/// The tick's end of the queue.
+pub type SegmentConsumer<'q> = Consumer<'q, RawSegment>;
+
+/// A time in 2^-32 ticks (0.23 ps).
+pub type TickTime = i64;
+
+/// One tick as a [`TickTime`].
+pub const ONE_TICK: TickTime = 1 << 32;
+
+/// Progress along a whole segment: 1 in 2^-62.
+pub const WHOLE: u64 = 1 << 62;
+
+/// Progress along a whole segment as the filters see it: 1 in 2^-30.
+pub const UNIT: i32 = 1 << 30;
+
+/// Longest duration of a segment in seconds (a day), far within [`TickTime`].
+pub const LONGEST_S: f64 = 86_400.0;
+
+/// A time in seconds as a [`TickTime`], rounded to nearest.
+#[must_use]
+pub fn tick_time(seconds: f64) -> TickTime {
+    libm::round(seconds * f64::from(TICK_HZ) * ONE_TICK as f64) as TickTime
+}
+
+/// A segment of the raw path: constant feedrate from start to target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RawSegment {
+    /// Pose at the start, in bits of [`Pose`].
+    pub start: [i32; AXES],
+    /// Pose at the end, in bits of [`Pose`].
+    pub target: [i32; AXES],
+    /// How long it lasts; at least one tick.
+    pub duration: TickTime,
+    /// Progress a tick, in 2^-62 of the segment.
+    pub rate: u64,
+    /// How long the raw path stands still before it, counted from the end of the segment
+    /// before.
+    pub dwell: TickTime,
+    /// What an arc adds to its chord.
+    pub bow: Option<Bow>,
+}
+
+impl RawSegment {
+    /// A segment that takes `duration_s` (one tick to [`LONGEST_S`]) after `dwell`.
+    #[must_use]
+    pub fn new(path: &PathSegment, duration_s: f64, dwell: TickTime) -> Self {
+        let duration = tick_time(duration_s).max(ONE_TICK);
+        let ticks = duration as f64 / ONE_TICK as f64;
+        Self {
+            start: path.start.to_bits(),
+            target: path.target.to_bits(),
+            duration,
+            rate: (WHOLE as f64 / ticks) as u64,
+            dwell,
+            bow: match path.shape {
+                Shape::Line => None,
+                Shape::Arc(arc) => Some(Bow::new(&arc)),
+            },
+        }
+    }
+
+    /// A stand-still of `duration_s` at a pose.
+    #[must_use]
+    pub fn stand_still(pose: Pose, duration_s: f64, dwell: TickTime) -> Self {
+        let path = PathSegment {
+            start: pose,
+            target: pose,
+            shape: Shape::Line,
+        };
+        Self::new(&path, duration_s, dwell)
+    }
+
+    /// The point of the chord after `progress` in 2^-30 of the segment.
+    ///
+    /// It is exactly the start at 0 and the target at [`UNIT`].
+    #[must_use]
+    pub fn chord_point(&self, progress: i32) -> [i32; AXES] {
+        let mut point = self.start;
+        for (value, target) in point.iter_mut().zip(self.target) {
+            let length = i64::from(target) - i64::from(*value);
+            let done = (length * i64::from(progress) + i64::from(UNIT / 2)) >> 30;
+            *value = value.wrapping_add(done as i32);
+        }
+        point
+    }
+}
+
+/// The bow of an arc: what it adds to its chord.
+///
+/// ```text
+/// bow(u) = R [cos, sin](θ₀ + φu) − R [cos, sin](θ₀) − u C,   C = R [cos, sin](θ₀ + φ) − R [cos, sin](θ₀)
+/// ```
+///
+/// It is exactly zero at both ends, so that an arc ends at its programmed target bit for
+/// bit; an arc whose ends differ in radius closes gradually along its way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Bow {
+    /// Radius in 2^-19 mm.
+    radius: i32,
+    /// Angle at the start in 2^-32 turns.
+    start: u32,
+    /// Sweep in 2^-32 turns, up to a full turn either way.
+    sweep: i64,
+    /// `R [cos, sin](θ₀)` in 2^-32 mm.
+    origin: [i64; 2],
+    /// `C` in 2^-32 mm.
+    chord: [i64; 2],
+}
+
+/// 2^-32 turns a radian.
+const TURNS_PER_RAD: f64 = (1_i64 << 32) as f64 / core::f64::consts::TAU;
+
+impl Bow {
+    fn new(arc: &Arc) -> Self {
+        let radius = libm::round(arc.radius_mm * f64::from(1 << 19)) as i32;
+        let start = libm::round(arc.start_angle_rad * TURNS_PER_RAD) as i64 as u32;
+        let sweep = libm::round(arc.sweep_rad * TURNS_PER_RAD) as i64;
+        let origin = on_circle(radius, start);
+        let [x1, y1] = on_circle(radius, start.wrapping_add(sweep as u32));
+        Self {
+            radius,
+            start,
+            sweep,
+            origin,
+            chord: [x1 - origin[0], y1 - origin[1]],
+        }
+    }
+
+    /// The bow in X and Y, in 2^-32 mm, after `progress` in 2^-30 of the segment.
+    #[must_use]
+    pub fn at(&self, progress: i32) -> [i64; 2] {
+        let turned = (self.sweep * i64::from(progress)) >> 30;
+        let [x, y] = on_circle(self.radius, self.start.wrapping_add(turned as u32));
+        [
+            x - self.origin[0] - part(self.chord[0], progress),
+            y - self.origin[1] - part(self.chord[1], progress),
+        ]
+    }
+}
+
+/// `R [cos, sin]` in 2^-32 mm for a radius in 2^-19 mm.
+fn on_circle(radius: i32, turns: u32) -> [i64; 2] {
+    let (sin, cos) = sin_cos(turns);
+    let scaled = |value: i32| (i64::from(radius) * i64::from(value)) >> (19 + 30 - 32);
+    [scaled(cos), scaled(sin)]
+}
+
+/// The part `progress` (2^-30) of a length in 2^-32 mm: in two halves, so that the product
+/// fits and the whole length comes out exactly.
+fn part(length: i64, progress: i32) -> i64 {
+    let (high, low) = (length >> 13, length & 0x1FFF);
+    let progress = i64::from(progress);
+    ((high * progress) >> (30 - 13)) + ((low * progress) >> 30)
+}

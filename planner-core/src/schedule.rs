@@ -1,0 +1,249 @@
+//! The schedule: when each segment of the raw path begins.
+//!
+//! A segment starts `t_d` after the one before has begun to decelerate; the corner solver
+//! gives `t_d` from the corner's tolerance. Corners that follow each other closely share the
+//! tolerance (see [`Schedule::plan`]), so that it holds on segments of any length.
+
+use heapless::Deque;
+
+use crate::config::Robot;
+use crate::corner::{self, Corner, Side, reach_s};
+use crate::math::sqrt_f32;
+use crate::path::PathSegment;
+use crate::pose::Pose;
+use crate::prefilter::Response;
+use crate::raw::{LONGEST_S, ONE_TICK, RawSegment, SegmentProducer, TickTime, tick_time};
+use crate::units::TICK_S;
+
+/// Corners that can still be rounding when another one begins. With more, the next segment
+/// waits for the oldest: slower, never wrong.
+const BLENDING_CORNERS: usize = 64;
+
+/// What the fixed-point trace can miss a point by, in mm: ten times its resolution.
+const RESOLUTION_MM: f32 = 2e-5;
+
+/// One control tick in seconds.
+const TICK: f32 = TICK_S as f32;
+
+/// A corner that is being rounded until the deceleration of its first segment ends.
+#[derive(Clone, Copy, Debug)]
+struct Blend {
+    /// Counted from the end of the raw path planned so far.
+    ends: TickTime,
+    /// `|u₂ − u₁|`, the change of the tangent; infinite beside an arc.
+    turn: f32,
+    /// How far the command strays along either tangent, for each mm/s of feedrate.
+    reach_s: f32,
+    /// The faster of its two segments.
+    feed_mm_s: f32,
+    tolerance_mm: f32,
+}
+
+/// Times segments and hands them to the tick.
+pub struct Schedule<'q> {
+    segments: SegmentProducer<'q>,
+    /// The segment that the next one makes a corner with; none where the path must stop.
+    previous: Option<Side>,
+    /// How long after a tick the raw path planned so far ends, if the look-ahead never runs
+    /// dry: then the path goes on at a tick.
+    since_tick: TickTime,
+    /// The corners that are still being rounded, oldest first.
+    blends: Deque<Blend, BLENDING_CORNERS>,
+}
+
+impl<'q> Schedule<'q> {
+    /// An empty schedule.
+    pub fn new(segments: SegmentProducer<'q>) -> Self {
+        Self {
+            segments,
+            previous: None,
+            since_tick: 0,
+            blends: Deque::new(),
+        }
+    }
+
+    /// Whether the look-ahead has room for another segment.
+    pub fn has_room(&self) -> bool {
+        self.segments.ready()
+    }
+
+    /// Forgets what came before: the next segment begins from rest.
+    pub fn reset(&mut self) {
+        self.previous = None;
+        self.since_tick = 0;
+        self.blends.clear();
+    }
+
+    /// Plans a segment that follows the last one, in `duration_s` (the caller has limited its
+    /// feedrate), with `tolerance_mm` at the corner between the two.
+    ///
+    /// The tolerance holds for segments of any length. A corner that is rounded alone misses
+    /// by its `e_c`. Where several are being rounded at once, the command is a weighted mean
+    /// of raw points on a polyline, and against the tangent at the mean each corner bends it
+    /// by at most its change of tangent times the mean distance that the raw point is past
+    /// the corner, or has yet to go, whichever is less:
+    ///
+    /// ```text
+    /// |P − path| ≤ F Σ |u₂ − u₁|_j r_j,     r_j = I(x) = I₋(t_c − x) for the corner's t_c
+    /// ```
+    ///
+    /// with `F` the fastest of the segments. A segment begins only when that sum, its own
+    /// corner included, is within the smallest tolerance of the corners being rounded, or
+    /// when they are done. Corners at arcs are always rounded alone.
+    ///
+    /// `false` if the look-ahead is full.
+    pub fn plan(
+        &mut self,
+        robot: &Robot,
+        path: &PathSegment,
+        duration_s: f64,
+        tolerance_mm: f32,
+    ) -> bool {
+        let length_mm = path.length_mm() as f32;
+        let duration_s = duration_s.clamp(TICK_S, LONGEST_S);
+        let (first_tangent, last_tangent, heading_rate_per_mm) = path.tangents();
+        let side = |tangent| Side {
+            feed_mm_s: length_mm / duration_s as f32,
+            tangent,
+            heading_rate_per_mm,
+            length_mm,
+        };
+        if !self.has_room() {
+            return false;
+        }
+        let dwell = match self.previous {
+            None => 0,
+            Some(arriving) => self.corner(robot, &arriving, &side(first_tangent), tolerance_mm),
+        };
+        self.previous = Some(side(last_tangent));
+        self.push(RawSegment::new(path, duration_s, dwell))
+    }
+
+    /// Plans a stand-still of `duration_s` after everything has stopped.
+    ///
+    /// `false` if the look-ahead is full.
+    pub fn dwell(&mut self, robot: &Robot, pose: Pose, duration_s: f64) -> bool {
+        let settle = robot.kernel.stop_time(self.since_tick);
+        self.previous = None;
+        self.blends.clear();
+        self.push(RawSegment::stand_still(
+            pose,
+            duration_s.clamp(TICK_S, LONGEST_S),
+            settle,
+        ))
+    }
+
+    fn push(&mut self, segment: RawSegment) -> bool {
+        let passed = segment.dwell + segment.duration;
+        self.since_tick = (self.since_tick + passed) % ONE_TICK;
+        for blend in &mut self.blends {
+            blend.ends -= passed;
+        }
+        self.segments.enqueue(segment).is_ok()
+    }
+
+    /// How long the raw path stands at a corner.
+    fn corner(
+        &mut self,
+        robot: &Robot,
+        arriving: &Side,
+        leaving: &Side,
+        tolerance_mm: f32,
+    ) -> TickTime {
+        let turns_only = arriving.feed_mm_s == 0.0 || leaving.feed_mm_s == 0.0;
+        let usable_mm = if turns_only { 0.0 } else { tolerance_mm };
+        let corner = solve_sampled(robot, arriving, leaving, usable_mm);
+        let settled = tick_time(robot.prefilter.length_s());
+        let mut dwell = if corner.cornering_s > 0.0 {
+            settled - tick_time(f64::from(corner.cornering_s)).min(settled)
+        } else {
+            robot.kernel.stop_time(self.since_tick)
+        };
+        let turn = turn(arriving, leaving);
+        let own = Blend {
+            // an arc keeps its filter until that has settled to the last bit
+            ends: if turn.is_finite() {
+                settled
+            } else {
+                robot.kernel.settling_time()
+            },
+            turn,
+            reach_s: reach_s(&robot.decelerating, &robot.accelerating, corner.cornering_s),
+            feed_mm_s: arriving.feed_mm_s.max(leaving.feed_mm_s),
+            tolerance_mm: usable_mm,
+        };
+        while let Some(oldest) = self.blends.front().copied() {
+            if oldest.ends > dwell && self.within_tolerance(&own) && !self.blends.is_full() {
+                break;
+            }
+            dwell = dwell.max(oldest.ends);
+            self.blends.pop_front();
+        }
+        if dwell < settled {
+            // there is room: a full deque has given up its oldest
+            let _ = self.blends.push_back(own);
+        }
+        dwell
+    }
+
+    /// Whether a further corner and those being rounded keep the smallest tolerance.
+    fn within_tolerance(&self, own: &Blend) -> bool {
+        let all = self.blends.iter().chain(core::iter::once(own));
+        let mut bend_s = 0.0;
+        let mut feed_mm_s = 0.0_f32;
+        let mut limit_mm = f32::INFINITY;
+        for blend in all {
+            bend_s += blend.turn * blend.reach_s;
+            feed_mm_s = feed_mm_s.max(blend.feed_mm_s);
+            limit_mm = limit_mm.min(blend.tolerance_mm);
+        }
+        feed_mm_s * bend_s <= limit_mm
+    }
+}
+
+/// `|u₂ − u₁|`, the change of the tangent at a corner between lines; infinite at an arc.
+fn turn(arriving: &Side, leaving: &Side) -> f32 {
+    if arriving.heading_rate_per_mm != 0.0 || leaving.heading_rate_per_mm != 0.0 {
+        return f32::INFINITY;
+    }
+    let pairs = arriving.tangent.iter().zip(leaving.tangent);
+    let squared: f32 = pairs.map(|(u1, u2)| (u2 - u1) * (u2 - u1)).sum();
+    sqrt_f32(squared)
+}
+
+/// Solves a corner so that the trace, which goes straight from one tick to the next, keeps
+/// the tolerance too.
+///
+/// Where the velocity turns by `Δv` within a tick, straight lines between ticks pass the
+/// turning point by up to `Δv T_s / 4`, and raw feedrates that change between ticks are seen
+/// at ticks only. With a box in the prefilter that makes about a micrometre, and a margin of
+/// twice the box's change within a tick is kept. A pure shaper lets the velocity jump: there the margin
+/// is taken only if the closest approach is within a tick of a jump.
+fn solve_sampled(robot: &Robot, arriving: &Side, leaving: &Side, tolerance_mm: f32) -> Corner {
+    let solve = |margin_mm: f32| {
+        corner::solve(
+            arriving,
+            leaving,
+            &robot.decelerating,
+            &robot.accelerating,
+            tolerance_mm - margin_mm - RESOLUTION_MM,
+        )
+    };
+    let margin_mm = |change_mm_s: f32| change_mm_s * TICK / 4.0;
+    if let Some(box_s) = robot.prefilter.longest_box_s() {
+        let both_mm_s = arriving.feed_mm_s + leaving.feed_mm_s;
+        let share = (2.0 * TICK / box_s as f32).min(1.0);
+        return solve(margin_mm(both_mm_s * share));
+    }
+    let corner = solve(0.0);
+    let since_start = corner.approach_s - corner.dwell_s;
+    let until_end = corner.deceleration_s - corner.approach_s;
+    let change = |response: &Response, t: f32| response.at(t + TICK).0 - response.at(t - TICK).0;
+    let change_mm_s = arriving.feed_mm_s * change(&robot.decelerating, until_end)
+        + leaving.feed_mm_s * change(&robot.accelerating, since_start);
+    if change_mm_s > 0.0 {
+        solve(margin_mm(change_mm_s))
+    } else {
+        corner
+    }
+}
