@@ -1,0 +1,190 @@
+//! Counts instructions on the emulated Cortex-M4F: a line `name instructions` for
+//! each piece of code, then `end`.
+//!
+//! Inputs and results go through `black_box`, or the compiler does the work beforehand.
+#![no_std]
+#![no_main]
+
+use core::fmt::Write;
+use core::hint::black_box;
+
+use firmware::board::{self, Console, Counter, Stopwatch};
+use planner_core::config::{Robot, RobotConfig};
+use planner_core::corner::{self, Side};
+use planner_core::motion::{DelayLines, Motion, MotionState};
+use planner_core::planner::{Accepted, Planner};
+use planner_core::prefilter::{Kind, PrefilterConfig};
+use planner_core::raw::SegmentQueue;
+use static_cell::ConstStaticCell;
+
+/// The corner path, arcs in a row with a helix and yaw, and half-millimetre segments.
+const PROGRAMS: [(&str, &str); 3] = [
+    (
+        "corner-path",
+        include_str!("../../../host-tests/programs/corner-path.gcode"),
+    ),
+    (
+        "arcs",
+        include_str!("../../../host-tests/programs/arcs.gcode"),
+    ),
+    (
+        "half-millimetres",
+        include_str!("../../../host-tests/programs/half-millimetres.gcode"),
+    ),
+];
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    static FILTERS: ConstStaticCell<DelayLines> = ConstStaticCell::new(DelayLines::new());
+    let (counter, console) = board::start_measuring();
+    let mut bench = Bench { counter, console };
+    bench.measure("nothing", || ());
+    for (name, rounds) in [("thousand-rounds", 1000), ("three-thousand-rounds", 3000)] {
+        bench.measure(name, || {
+            let mut round = 0_u32;
+            while round < rounds {
+                round = black_box(round + 1);
+            }
+        });
+    }
+    let filters = FILTERS.take();
+    for (program, text) in PROGRAMS {
+        for (filter, kind, frequency_hz) in [
+            ("fir-zvd", Kind::FirZvd, 6.34),
+            ("fir-zvd-0.1s", Kind::FirZvd, 20.0),
+            ("fir-zvd-1s", Kind::FirZvd, 2.0),
+            ("ei", Kind::Ei, 6.34),
+        ] {
+            let robot = robot(kind, frequency_hz);
+            let worst = bench.run(&robot, text, filters);
+            bench.print(format_args!("tick/{program}/{filter}"), worst.tick);
+            bench.print(format_args!("line/{program}/{filter}"), worst.line);
+        }
+    }
+    for kind in Kind::ALL {
+        let worst = bench.corners(&robot(kind, 6.34));
+        bench.print(format_args!("corner/{}", kind.name()), worst);
+    }
+    bench.end()
+}
+
+fn robot(kind: Kind, frequency_hz: f32) -> Robot {
+    let config = RobotConfig {
+        prefilter: PrefilterConfig {
+            kind,
+            frequency_hz,
+            damping: 0.022,
+        },
+        ..RobotConfig::default()
+    };
+    defmt::unwrap!(Robot::new(&config).ok(), "the settings are within range")
+}
+
+/// The dearest of each, in instructions.
+#[derive(Default)]
+struct Worst {
+    tick: u32,
+    line: u32,
+}
+
+struct Bench {
+    counter: Counter,
+    console: Console,
+}
+
+impl Bench {
+    /// Runs `code` once and prints its instructions, the call included.
+    #[inline(never)]
+    fn measure<R>(&mut self, name: &str, code: impl FnOnce() -> R) {
+        let instructions = self.count(code);
+        self.print(format_args!("{name}"), instructions);
+    }
+
+    #[inline(never)]
+    fn count<R>(&self, code: impl FnOnce() -> R) -> u32 {
+        let start = self.counter.now();
+        let result = code();
+        let instructions = self.counter.since(start);
+        black_box(result);
+        instructions
+    }
+
+    /// The dearest tick and the dearest line of a program.
+    fn run(&self, robot: &Robot, program: &str, filters: &mut DelayLines) -> Worst {
+        let mut worst = Worst::default();
+        let mut queue = SegmentQueue::new();
+        let (producer, consumer) = queue.split();
+        let mut planner = Planner::new(robot, producer);
+        let mut motion = Motion::new(robot, consumer, filters);
+        let mut lines = program.lines();
+        let mut more = true;
+        loop {
+            while more && planner.has_room() {
+                let Some(line) = lines.next() else {
+                    more = false;
+                    break;
+                };
+                let mut accepted = None;
+                let cost = self.count(|| accepted = planner.line(black_box(line).as_bytes()).ok());
+                worst.line = worst.line.max(cost);
+                match defmt::unwrap!(accepted, "the program is right") {
+                    Accepted::Reference(pose) => motion.place(pose),
+                    Accepted::End => more = false,
+                    Accepted::Nothing | Accepted::Queued => {}
+                }
+            }
+            motion.start();
+            let mut state = MotionState::Idle;
+            let cost = self.count(|| state = motion.tick().state);
+            worst.tick = worst.tick.max(cost);
+            if state == MotionState::Idle && !more {
+                return worst;
+            }
+        }
+    }
+
+    /// The dearest corner over angles, feedrates, tolerances, lines and arcs.
+    fn corners(&self, robot: &Robot) -> u32 {
+        let mut worst = 0;
+        for step in 0..200_u16 {
+            // 0 to 180° and a spread of the rest that repeats with different periods
+            let (sin, cos) = planner_core::math::sin_cos_f32(f32::from(step) * 0.0157);
+            let heading_rate_per_mm = [0.0, 0.022, -0.1, 1.0][usize::from(step % 4)];
+            let side = |tangent, feed_mm_s| Side {
+                feed_mm_s,
+                tangent,
+                heading_rate_per_mm,
+                length_mm: [100.0, 3.0, 0.2][usize::from(step % 3)],
+            };
+            let arriving = side(
+                [1.0, 0.0, 0.0],
+                [160.0, 20.0, 500.0][usize::from(step / 2 % 3)],
+            );
+            let leaving = side([cos, sin, 0.0], [160.0, 90.0][usize::from(step / 3 % 2)]);
+            let tolerance_mm = [0.5, 0.05, 2.0, 0.01, 0.2][usize::from(step % 5)];
+            let cost = self.count(|| {
+                corner::solve(
+                    black_box(&arriving),
+                    black_box(&leaving),
+                    &robot.decelerating,
+                    &robot.accelerating,
+                    tolerance_mm,
+                )
+            });
+            worst = worst.max(cost);
+        }
+        worst
+    }
+
+    fn print(&mut self, name: core::fmt::Arguments<'_>, instructions: u32) {
+        // The console cannot fail.
+        let _ = writeln!(self.console, "{name} {instructions}");
+    }
+
+    fn end(&mut self) -> ! {
+        let _ = writeln!(self.console, "end");
+        loop {
+            cortex_m::asm::wfi();
+        }
+    }
+}

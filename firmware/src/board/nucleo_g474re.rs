@@ -1,0 +1,213 @@
+//! ST's NUCLEO-G474RE: an STM32G474RE at 170 MHz.
+//!
+//! | | |
+//! |---|---|
+//! | commands | LPUART1, PA2 / PA3: the ST-LINK's virtual serial port, 115200 Bd |
+//! | setpoints | USART1 TX on PC4 (Arduino D1), 2 MBd |
+//! | clock | HSE 24 MHz, PLL ÷ 6 × 85 ÷ 2 |
+#![allow(unsafe_code, reason = "interrupt handlers call their executors")]
+
+use cortex_m::peripheral::DWT;
+use defmt_rtt as _;
+use embassy_executor::InterruptExecutor;
+use embassy_stm32::interrupt::{self, InterruptExt, Priority};
+use embassy_stm32::mode::Async;
+use embassy_stm32::peripherals::{DMA1_CH1, IWDG, LPUART1};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, BufferedUartTx, UartTx};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{bind_interrupts, dma, rcc};
+use embedded_io_async::{Read, Write};
+use panic_probe as _;
+use static_cell::ConstStaticCell;
+
+use super::{Board, ByteIn, ByteOut, Stopwatch, WATCHDOG_MS, Watchdog};
+
+/// The real board's parts.
+pub type Parts = Board<CommandIn, CommandOut, SetpointOut, BoardWatchdog, Counter>;
+
+const COMMAND_BAUD: u32 = 115_200;
+
+/// A frame is 83 bytes of 10 bits, so 1 kHz takes 830 kBd; 170 MHz / 85 is exact.
+const SETPOINT_BAUD: u32 = 2_000_000;
+
+/// The command task may be planning while bytes arrive: 22 ms of them at 115200 Bd.
+const RX_RING: usize = 256;
+
+/// The longest answer and some more.
+const TX_RING: usize = 256;
+
+/// The time driver keeps P0. The command port comes last: its FIFO of eight bytes
+/// lasts 0.7 ms.
+mod priority {
+    use super::Priority;
+    pub const CONTROL: Priority = Priority::P2;
+    pub const DMA: Priority = Priority::P4;
+    pub const SETPOINTS: Priority = Priority::P5;
+    pub const COMMANDS: Priority = Priority::P6;
+}
+
+bind_interrupts!(struct Irqs {
+    LPUART1 => usart::BufferedInterruptHandler<LPUART1>;
+    DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>;
+});
+
+/// The executors run in the interrupts of peripherals which this board does not use.
+static CONTROL: InterruptExecutor = InterruptExecutor::new();
+static SETPOINTS: InterruptExecutor = InterruptExecutor::new();
+
+#[embassy_stm32::interrupt]
+unsafe fn SAI1() {
+    // SAFETY: this is the executor's interrupt, unmasked by its `start`.
+    unsafe { CONTROL.on_interrupt() }
+}
+
+#[embassy_stm32::interrupt]
+unsafe fn UCPD1() {
+    // SAFETY: likewise.
+    unsafe { SETPOINTS.on_interrupt() }
+}
+
+/// Sets the board up; once.
+pub fn start() -> Parts {
+    let mut config = embassy_stm32::Config::default();
+    config.rcc = clocks();
+    // The G4's DMA goes by the name of BDMA in the HAL.
+    config.bdma_interrupt_priority = priority::DMA;
+    let p = embassy_stm32::init(config);
+    defmt::info!("Stillpoint on NUCLEO-G474RE");
+
+    static TX: ConstStaticCell<[u8; TX_RING]> = ConstStaticCell::new([0; TX_RING]);
+    static RX: ConstStaticCell<[u8; RX_RING]> = ConstStaticCell::new([0; RX_RING]);
+    let mut serial = usart::Config::default();
+    serial.baudrate = COMMAND_BAUD;
+    serial.eager_reads = Some(1);
+    let commands = BufferedUart::new(p.LPUART1, p.PA3, p.PA2, TX.take(), RX.take(), Irqs, serial);
+    let commands = defmt::unwrap!(commands, "115200 Bd is within LPUART1's range");
+    let (command_out, command_in) = commands.split();
+
+    let mut serial = usart::Config::default();
+    serial.baudrate = SETPOINT_BAUD;
+    let setpoints = UartTx::new(p.USART1, p.PC4, p.DMA1_CH1, Irqs, serial);
+    let setpoints = defmt::unwrap!(setpoints, "2 MBd is within USART1's range");
+
+    interrupt::LPUART1.set_priority(priority::COMMANDS);
+    interrupt::SAI1.set_priority(priority::CONTROL);
+    interrupt::UCPD1.set_priority(priority::SETPOINTS);
+    let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_MS * 1000);
+    watchdog.unleash();
+    Board {
+        command_in: CommandIn(command_in),
+        command_out: CommandOut(command_out),
+        setpoint_out: SetpointOut(setpoints),
+        watchdog: BoardWatchdog(watchdog),
+        stopwatch: Counter::start(),
+        control: CONTROL.start(interrupt::SAI1),
+        setpoints: SETPOINTS.start(interrupt::UCPD1),
+    }
+}
+
+/// Nothing: the executor's WFE puts this core to sleep.
+pub async fn idle() -> ! {
+    core::future::pending().await
+}
+
+/// 170 MHz from the crystal; above 150 MHz the core needs the boost mode.
+fn clocks() -> rcc::Config {
+    let mut clocks = rcc::Config::new();
+    clocks.hse = Some(rcc::Hse {
+        freq: Hertz(24_000_000),
+        mode: rcc::HseMode::Oscillator,
+    });
+    clocks.pll = Some(rcc::Pll {
+        source: rcc::PllSource::HSE,
+        prediv: rcc::PllPreDiv::DIV6,
+        mul: rcc::PllMul::MUL85,
+        divp: None,
+        divq: None,
+        divr: Some(rcc::PllRDiv::DIV2),
+    });
+    clocks.sys = rcc::Sysclk::PLL1_R;
+    clocks.boost = true;
+    clocks
+}
+
+/// The command port's receiving side.
+pub struct CommandIn(BufferedUartRx<'static>);
+
+impl ByteIn for CommandIn {
+    async fn read(&mut self, into: &mut [u8]) -> usize {
+        loop {
+            match self.0.read(into).await {
+                Ok(count) if count > 0 => return count,
+                Ok(_) => {}
+                Err(error) => defmt::warn!("command port: {}", error),
+            }
+        }
+    }
+}
+
+/// The command port's sending side.
+pub struct CommandOut(BufferedUartTx<'static>);
+
+impl ByteOut for CommandOut {
+    async fn write_all(&mut self, bytes: &[u8]) {
+        if let Err(error) = Write::write_all(&mut self.0, bytes).await {
+            defmt::warn!("command port: {}", error);
+        }
+    }
+}
+
+/// The setpoint port.
+pub struct SetpointOut(UartTx<'static, Async>);
+
+impl ByteOut for SetpointOut {
+    async fn write_all(&mut self, bytes: &[u8]) {
+        if let Err(error) = self.0.write(bytes).await {
+            defmt::warn!("setpoint port: {}", error);
+        }
+    }
+}
+
+/// The independent watchdog, on its own oscillator.
+pub struct BoardWatchdog(IndependentWatchdog<'static, IWDG>);
+
+impl Watchdog for BoardWatchdog {
+    fn feed(&mut self) {
+        self.0.pet();
+    }
+}
+
+/// Counts core cycles.
+#[derive(Clone, Copy)]
+pub struct Counter {
+    reading: u32,
+}
+
+impl Counter {
+    fn start() -> Self {
+        // `embassy_stm32::init` takes only ST's peripherals; the core's are free.
+        if let Some(mut core) = cortex_m::Peripherals::take() {
+            core.DCB.enable_trace();
+            core.DWT.enable_cycle_counter();
+        }
+        let start = DWT::cycle_count();
+        Self {
+            reading: DWT::cycle_count().wrapping_sub(start),
+        }
+    }
+}
+
+impl Stopwatch for Counter {
+    const UNIT: &'static str = "cycles";
+
+    fn now(&self) -> u32 {
+        DWT::cycle_count()
+    }
+
+    fn since(&self, start: u32) -> u32 {
+        DWT::cycle_count()
+            .wrapping_sub(start)
+            .saturating_sub(self.reading)
+    }
+}

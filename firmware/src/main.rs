@@ -1,0 +1,98 @@
+//! Wires the board to the tasks.
+#![no_std]
+#![no_main]
+
+use embassy_executor::Executor;
+use firmware::board::{self, Board, BoardWatchdog, CommandIn, CommandOut, Counter, SetpointOut};
+use firmware::tasks::command::{Commands, Received};
+use firmware::tasks::control::Frames;
+use firmware::tasks::link::Link;
+use firmware::tasks::{command, control, setpoints};
+use planner_core::config::{Robot, RobotConfig};
+use planner_core::motion::{DelayLines, Motion};
+use planner_core::planner::Planner;
+use planner_core::raw::SegmentQueue;
+use static_cell::{ConstStaticCell, StaticCell};
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    static EXECUTOR: StaticCell<Executor> = StaticCell::new();
+    let commands = start();
+    EXECUTOR.init(Executor::new()).run(|thread| {
+        thread.spawn(defmt::unwrap!(idle_task()));
+        thread.spawn(defmt::unwrap!(command_task(commands)));
+    })
+}
+
+/// Starts the board, the control task and the setpoint task; returns what the command task
+/// needs. Not inlined, because the frame of `main` stays on the stack for ever.
+#[inline(never)]
+fn start() -> Commands<CommandIn, CommandOut> {
+    static LINK: StaticCell<Link> = StaticCell::new();
+    static FRAMES: StaticCell<Frames> = StaticCell::new();
+    static SEGMENTS: ConstStaticCell<SegmentQueue> = ConstStaticCell::new(SegmentQueue::new());
+    static FILTERS: ConstStaticCell<DelayLines> = ConstStaticCell::new(DelayLines::new());
+    static RECEIVED: ConstStaticCell<Received> = ConstStaticCell::new(Received::new());
+    static PLANNER: StaticCell<Planner<'static>> = StaticCell::new();
+    static ROBOT: StaticCell<Robot> = StaticCell::new();
+
+    let Board {
+        command_in,
+        command_out,
+        setpoint_out,
+        watchdog,
+        stopwatch,
+        control,
+        setpoints,
+    } = board::start();
+    let config = RobotConfig::default();
+    let robot = ROBOT
+        .init_with(|| defmt::expect!(Robot::new(&config).ok(), "the default settings are a robot"));
+    let link: &Link = LINK.init(Link::default());
+    let frames: &Frames = FRAMES.init(Frames::new());
+    let (to_motion, from_planner) = SEGMENTS.take().split();
+    let blocks = to_motion.capacity();
+    let motion = Motion::new(robot, from_planner, FILTERS.take());
+    let planner = PLANNER.init_with(|| Planner::new(robot, to_motion));
+
+    control.spawn(defmt::unwrap!(control_task(
+        motion, link, frames, stopwatch, watchdog
+    )));
+    setpoints.spawn(defmt::unwrap!(setpoint_task(frames, setpoint_out)));
+    Commands {
+        input: command_in,
+        output: command_out,
+        received: RECEIVED.take(),
+        planner,
+        config,
+        robot,
+        link,
+        blocks,
+    }
+}
+
+#[embassy_executor::task]
+async fn control_task(
+    motion: Motion<'static>,
+    link: &'static Link,
+    frames: &'static Frames,
+    stopwatch: Counter,
+    watchdog: BoardWatchdog,
+) {
+    control::run(motion, link, frames, stopwatch, watchdog).await
+}
+
+#[embassy_executor::task]
+async fn setpoint_task(frames: &'static Frames, port: SetpointOut) {
+    setpoints::run(frames, port).await
+}
+
+#[embassy_executor::task]
+async fn command_task(commands: Commands<CommandIn, CommandOut>) {
+    command::run::<Counter>(commands).await
+}
+
+#[embassy_executor::task]
+async fn idle_task() {
+    board::idle().await
+}
