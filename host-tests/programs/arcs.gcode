@@ -1,0 +1,14 @@
+; Short arcs one after the other, a helix and a turn of the yaw: every arc channel busy.
+G21 G90 G17
+G0 X200 Y0 Z0 C0
+G64 P1
+G3 X205 Y5 I0 J5 F9600
+G2 X210 Y10 I5 J0
+G3 X212 Y12 I0 J2
+G2 X214 Y14 I2 J0 Z5 C20
+G3 X219 Y19 I0 J5 Z0 C-20
+G2 X219 Y19 I10 J0
+G3 X230 Y30 I0 J11
+G1 X230 Y-20
+G2 X200 Y0 I-15 J10
+M2

@@ -1,0 +1,3 @@
+; nothing moves
+G21 G90
+M2

@@ -1,0 +1,225 @@
+//! `stillpoint compare`: all prefilters side by side.
+
+use std::sync::Mutex;
+use std::thread;
+
+use anyhow::{Result, anyhow};
+use clap::Args;
+use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
+use comfy_table::{Attribute, Cell, CellAlignment, LineStyle, Table};
+use planner_core::config::{ConfigError, Robot};
+use planner_core::prefilter::{Kind, PrefilterError};
+use serde::Serialize;
+
+use super::ScenarioArgs;
+use crate::progress::Progress;
+use crate::scenario::{Outcome, Scenario};
+use crate::summary::{Figures, Ratios};
+
+/// Arguments of `compare`.
+#[derive(Args, Debug)]
+#[command(allow_negative_numbers = true)]
+pub struct CompareArgs {
+    #[command(flatten)]
+    scenario: ScenarioArgs,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// All prefilters on one program.
+#[derive(Debug, Serialize)]
+pub struct Comparison {
+    program: String,
+    frequency_hz: f32,
+    damping: f32,
+    tolerance_mm: f32,
+    plant: &'static str,
+    prefilters: Vec<Row>,
+}
+
+/// One prefilter.
+#[derive(Debug, Serialize)]
+struct Row {
+    prefilter: &'static str,
+    /// Why it cannot be used at this frequency; null if it can.
+    refused: Option<String>,
+    #[serde(flatten)]
+    measured: Option<Measured>,
+}
+
+#[derive(Debug, Serialize)]
+struct Measured {
+    #[serde(flatten)]
+    figures: Figures,
+    #[serde(flatten)]
+    ratios: Ratios,
+}
+
+/// Runs the command; yields what it has to say.
+///
+/// # Errors
+/// Whatever stops the program from running to its end, in one sentence.
+pub fn execute(args: &CompareArgs) -> Result<String> {
+    let scenario = args.scenario.scenario()?;
+    let progress = if args.json {
+        Progress::Hidden
+    } else {
+        Progress::Shown
+    };
+    let comparison = Comparison::run(&scenario, progress)?;
+    if args.json {
+        Ok(serde_json::to_string_pretty(&comparison)?)
+    } else {
+        Ok(comparison.table())
+    }
+}
+
+impl Comparison {
+    /// Runs a scenario with each prefilter, on all cores.
+    ///
+    /// # Errors
+    /// The program or a setting is refused. A prefilter that is too long at this frequency
+    /// is left out instead.
+    pub fn run(scenario: &Scenario, progress: Progress) -> Result<Self> {
+        let unfiltered = scenario.run_with(Kind::None, Progress::Hidden)?;
+        let bar = progress.bar("prefilters", Kind::ALL.len());
+        let next = Mutex::new(Kind::ALL.into_iter());
+        let rows = Mutex::new(Vec::new());
+        let work = || {
+            loop {
+                let Some(kind) = next.lock().ok().and_then(|mut next| next.next()) else {
+                    return;
+                };
+                let row = row(scenario, kind, &unfiltered);
+                bar.inc(1);
+                if let Ok(mut rows) = rows.lock() {
+                    rows.push((kind as usize, row));
+                }
+            }
+        };
+        let threads = thread::available_parallelism().map_or(1, usize::from);
+        thread::scope(|scope| {
+            for _ in 0..threads.min(Kind::ALL.len()) {
+                scope.spawn(work);
+            }
+        });
+        bar.finish_and_clear();
+        let mut rows = rows
+            .into_inner()
+            .map_err(|_| anyhow!("a comparison was cut short: run it again"))?;
+        rows.sort_by_key(|(order, _)| *order);
+        let robot = &scenario.settings.robot;
+        Ok(Self {
+            program: scenario.program.name.clone(),
+            frequency_hz: robot.prefilter.frequency_hz,
+            damping: robot.prefilter.damping,
+            tolerance_mm: robot.corner_tolerance_mm,
+            plant: scenario.plant.name(),
+            prefilters: rows
+                .into_iter()
+                .map(|(_, row)| row)
+                .collect::<Result<_>>()?,
+        })
+    }
+
+    /// As a table for a terminal.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let mut table = Table::new();
+        let header = HEADER.map(|text| Cell::new(text).add_attribute(Attribute::Bold));
+        table
+            .load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()))
+            .set_header(header);
+        for row in &self.prefilters {
+            table.add_row(row.cells());
+        }
+        for column in table.column_iter_mut().skip(1) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        let refused: String = self
+            .prefilters
+            .iter()
+            .filter_map(|row| Some(format!("\n{}: {}", row.prefilter, row.refused.as_ref()?)))
+            .collect();
+        format!(
+            "{}: {} Hz, damping {}, corner tolerance {} mm, {} plant\n{table}\n\
+             Settling to ±50 µm after the commanded stop; largest corner error; the tool's \
+             acceleration in mm/s²\nin motion and in the 3 s after, and over both as a part of \
+             that without a prefilter; peak joint accelerations.{refused}",
+            self.program, self.frequency_hz, self.damping, self.tolerance_mm, self.plant
+        )
+    }
+}
+
+const HEADER: [&str; 10] = [
+    "prefilter",
+    "cycle\ns",
+    "settling\ns",
+    "corner\nmm",
+    "in motion\nmax, RMS",
+    "after stop\nmax, RMS",
+    "of none\nmax",
+    "of none\nRMS",
+    "joint 1\nrad/s²",
+    "joint 2\nrad/s²",
+];
+
+impl Row {
+    fn cells(&self) -> Vec<String> {
+        let mut cells = vec![self.prefilter.to_owned()];
+        let Some(Measured { figures, ratios }) = &self.measured else {
+            cells.push("refused".into());
+            return cells;
+        };
+        let or_none = |value: Option<f64>, digits: usize| {
+            value.map_or_else(|| "-".into(), |value| format!("{value:.digits$}"))
+        };
+        let percent = |ratio: Option<f64>| {
+            ratio.map_or_else(|| "-".into(), |ratio| format!("{:.1} %", 100.0 * ratio))
+        };
+        cells.extend([
+            format!("{:.3}", figures.cycle_time_s),
+            or_none(figures.settling_time_s, 3),
+            or_none(figures.max_corner_error_mm, 4),
+            format!(
+                "{:.0}, {:.0}",
+                figures.vibration_motion_max_mm_s2, figures.vibration_motion_rms_mm_s2
+            ),
+            format!(
+                "{:.1}, {:.1}",
+                figures.vibration_residual_max_mm_s2, figures.vibration_residual_rms_mm_s2
+            ),
+            percent(ratios.vibration_max_ratio),
+            percent(ratios.vibration_rms_ratio),
+            format!("{:.1}", figures.joint1_peak_rad_s2),
+            format!("{:.1}", figures.joint2_peak_rad_s2),
+        ]);
+        cells
+    }
+}
+
+fn row(scenario: &Scenario, kind: Kind, unfiltered: &Outcome) -> Result<Row> {
+    let mut config = scenario.settings.robot;
+    config.prefilter.kind = kind;
+    if let Err(error @ ConfigError::Prefilter(PrefilterError::TooLong { .. })) = Robot::new(&config)
+    {
+        return Ok(Row {
+            prefilter: kind.name(),
+            refused: Some(error.to_string()),
+            measured: None,
+        });
+    }
+    let outcome = match kind {
+        Kind::None => unfiltered.clone(),
+        _ => scenario.run_with(kind, Progress::Hidden)?,
+    };
+    Ok(Row {
+        prefilter: kind.name(),
+        refused: None,
+        measured: Some(Measured {
+            figures: Figures::new(&outcome),
+            ratios: Ratios::new(&outcome, unfiltered),
+        }),
+    })
+}

@@ -1,0 +1,24 @@
+//! The commands of the program `stillpoint`, one a file: arguments in, sentences out.
+
+pub mod compare;
+pub mod corner;
+pub mod demo;
+pub mod forward;
+pub mod inverse;
+mod model_args;
+pub mod output;
+pub mod prefilter;
+pub mod run;
+mod scenario_args;
+
+pub use model_args::ModelArgs;
+pub use scenario_args::ScenarioArgs;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use planner_core::prefilter::Kind;
+
+/// Reads a prefilter's name; its help lists them all.
+fn prefilter_parser() -> impl TypedValueParser<Value = Kind> {
+    PossibleValuesParser::new(Kind::ALL.map(Kind::name))
+        .try_map(|name| Kind::from_name(&name).ok_or("there is no such prefilter"))
+}

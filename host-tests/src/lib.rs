@@ -1,0 +1,29 @@
+//! The PC side of Stillpoint: the software loop with its plant, the checker that trusts
+//! nobody, and the program `stillpoint`.
+//!
+//! | from | through | to |
+//! |---|---|---|
+//! | [`robot_file`], [`program_file`] | [`machine`]: planner and tick, here or emulated | setpoints |
+//! | setpoints | [`trace`]: the [`plant`] | the tool's motion |
+//! | trace | [`checker`], [`vibration`] | [`scenario`]'s outcome: [`summary`], [`pictures`] |
+
+pub mod checker;
+pub mod commands;
+pub mod emulator;
+pub mod machine;
+pub mod oracle;
+pub mod paired_run;
+pub mod pictures;
+pub mod plant;
+pub mod plant_config;
+pub mod program_file;
+pub mod progress;
+pub mod random_program;
+pub mod robot_file;
+pub mod scenario;
+pub mod software_loop;
+pub mod summary;
+mod toml_place;
+pub mod trace;
+pub mod vector;
+pub mod vibration;

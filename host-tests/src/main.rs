@@ -1,0 +1,60 @@
+//! The program `stillpoint`.
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use host_tests::commands::{compare, corner, demo, forward, inverse, prefilter, run};
+
+/// Motion control that leaves the robot still: plans, runs and measures path programs.
+///
+/// Without a command it runs the built-in corner path and writes pictures of it to
+/// stillpoint-out/.
+#[derive(Parser)]
+#[command(version, name = "stillpoint")]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Runs a program on the simulated robot and measures what it did.
+    Run(run::RunArgs),
+    /// Runs a program with every prefilter and shows the figures side by side.
+    Compare(compare::CompareArgs),
+    /// Solves one corner: how much two segments may overlap within a tolerance.
+    Corner(corner::CornerArgs),
+    /// Shows how long a prefilter is and how much vibration it leaves.
+    Prefilter(prefilter::PrefilterArgs),
+    /// From a pose to the joints, in the microcontroller's arithmetic.
+    Inverse(inverse::InverseArgs),
+    /// From the joints to a pose, in the microcontroller's arithmetic.
+    Forward(forward::ForwardArgs),
+}
+
+fn main() -> ExitCode {
+    let done = match Cli::parse().command {
+        None => demo::execute(),
+        Some(Command::Run(args)) => run::execute(&args),
+        Some(Command::Compare(args)) => compare::execute(&args),
+        Some(Command::Corner(args)) => corner::execute(&args),
+        Some(Command::Prefilter(args)) => prefilter::execute(&args),
+        Some(Command::Inverse(args)) => inverse::execute(&args),
+        Some(Command::Forward(args)) => forward::execute(&args),
+    };
+    match done {
+        // A reader that has seen enough is no error.
+        Ok(text) => match writeln!(io::stdout(), "{text}") {
+            Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+                eprintln!("stillpoint: the answer cannot be written ({error})");
+                ExitCode::FAILURE
+            }
+            _ => ExitCode::SUCCESS,
+        },
+        Err(error) => {
+            eprintln!("stillpoint: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

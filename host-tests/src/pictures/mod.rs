@@ -1,0 +1,26 @@
+//! Pictures of a run, as SVG.
+//!
+//! Colours are those of Okabe and Ito, which the colour-blind can tell apart; limits and
+//! tolerances are drawn dashed in green.
+
+mod canvas;
+mod feedrate;
+mod path;
+mod polyline;
+mod vibration;
+
+use anyhow::Result;
+
+use crate::paired_run::PairedRun;
+
+/// Draws all pictures: file names and their text.
+///
+/// # Errors
+/// Never in practice: the drawing goes to memory.
+pub fn draw(run: &PairedRun) -> Result<Vec<(&'static str, String)>> {
+    Ok(vec![
+        ("path.svg", path::draw(run)?),
+        ("feedrate.svg", feedrate::draw(run)?),
+        ("vibration.svg", vibration::draw(run)?),
+    ])
+}

@@ -1,0 +1,135 @@
+//! Settings of the full plant and the robot they describe by default.
+
+use std::fmt;
+use std::sync::Arc;
+
+use super::arm::{ArmInertia, ScaraArm};
+use super::drive::{AccelerationSource, DriveConfig};
+use super::mode::Mode;
+
+/// Joints of the robot.
+pub const JOINTS: usize = 4;
+
+/// The end effector's mode over the workspace.
+#[derive(Clone)]
+pub struct ModeMap(Arc<dyn Fn([f64; 3]) -> Mode + Send + Sync>);
+
+impl ModeMap {
+    /// The same mode everywhere.
+    #[must_use]
+    pub fn constant(mode: Mode) -> Self {
+        Self(Arc::new(move |_| mode))
+    }
+
+    /// A mode that depends on the flange's position in millimetres.
+    pub fn from_fn(map: impl Fn([f64; 3]) -> Mode + Send + Sync + 'static) -> Self {
+        Self(Arc::new(map))
+    }
+
+    /// The mode with the flange at `position_mm`.
+    #[must_use]
+    pub fn at(&self, position_mm: [f64; 3]) -> Mode {
+        (self.0)(position_mm)
+    }
+}
+
+impl Default for ModeMap {
+    fn default() -> Self {
+        Self::constant(Mode::default())
+    }
+}
+
+impl fmt::Debug for ModeMap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("ModeMap")
+    }
+}
+
+/// One joint with its drive; joint 3 in metres and newtons.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointConfig {
+    /// Its drive.
+    pub drive: DriveConfig,
+    /// Stiffness between motor and link: Nm/rad or N/m.
+    pub stiffness: f64,
+    /// Damping between motor and link: Nm·s/rad or N·s/m.
+    pub damping: f64,
+    /// Inertia of the quill and the wrist; the links have [`ArmInertia`].
+    pub link_inertia: f64,
+    /// Largest error of an encoder reading, evenly distributed: rad or m.
+    pub encoder_noise: f64,
+}
+
+/// Settings of the full plant.
+#[derive(Clone, Debug)]
+pub struct FullConfig {
+    /// Geometry.
+    pub arm: ScaraArm,
+    /// Inertia of the two links.
+    pub inertia: ArmInertia,
+    /// Joints and drives.
+    pub joints: [JointConfig; JOINTS],
+    /// Mass that swings in the end effector's mode, kilograms.
+    pub tool_mass_kg: f64,
+    /// The end effector's mode.
+    pub mode: ModeMap,
+    /// Seed of the encoders' noise.
+    pub seed: u64,
+    /// Joints at the start: rad, rad, mm, rad.
+    pub start: [f64; JOINTS],
+}
+
+/// A table-top SCARA of 200 + 150 mm. Its joints resonate at some 36 Hz (shoulder,
+/// as the robot of vNoorden21) to 60 Hz, well above the end effector's 6.34 Hz.
+///
+/// The swinging mass is small: the arm's own compliance then lowers the mode's
+/// frequency by less than 0.1 %, and the number set is the number seen.
+impl Default for FullConfig {
+    fn default() -> Self {
+        // Upper arm 3 kg, forearm with quill 2.5 kg, its centre 80 mm from the elbow.
+        let inertia = ArmInertia {
+            a: 0.166,
+            b: 0.040,
+            d: 0.026,
+        };
+        Self {
+            arm: ScaraArm::default(),
+            inertia,
+            joints: [
+                joint(0.080, inertia.a, 10_000.0, 150.0),
+                joint(0.030, inertia.d, 3_000.0, 60.0),
+                joint(6.0, 3.0, 1.0e6, 1_500.0),
+                joint(0.002, 0.002, 300.0, 5.0),
+            ],
+            tool_mass_kg: 0.05,
+            mode: ModeMap::default(),
+            seed: 0,
+            start: [0.0, 1.5, 0.0, 0.0],
+        }
+    }
+}
+
+/// A joint with the drive gains of vNoorden21, scaled to this arm: its flexible
+/// joints and the slower motors bring K_p from 1100 to 200 1/s; K_v gives the bare
+/// motor a bandwidth of 2500 rad/s; the integral time is the thesis's.
+fn joint(motor: f64, link: f64, stiffness: f64, torque_limit: f64) -> JointConfig {
+    JointConfig {
+        drive: DriveConfig {
+            motor_inertia: motor,
+            feed_forward_inertia: motor + link,
+            position_gain: 200.0,
+            velocity_gain: 2500.0 * motor,
+            integral_time_s: 0.0067,
+            velocity_feed_forward: 1.0,
+            acceleration_feed_forward: 1.0,
+            acceleration_source: AccelerationSource::Interpolated,
+            torque_limit,
+        },
+        stiffness,
+        // A damping ratio of 0.05 against a motor that holds still.
+        damping: 2.0 * 0.05 * (stiffness * link).sqrt(),
+        link_inertia: link,
+        // About one count of a 23-bit encoder on the joint.
+        encoder_noise: 1.0e-6 * if motor > 1.0 { 0.1 } else { 1.0 },
+    }
+}

@@ -1,0 +1,259 @@
+//! The full plant: drives, flexible joints, links, and a mode at the end effector.
+//!
+//! | part | model |
+//! |---|---|
+//! | setpoints | one tick of transport, then one tick of cubic interpolation |
+//! | drive | [`Drive`], 8 kHz, encoder on the motor with seeded noise |
+//! | joint | motor inertia, spring and damper, link |
+//! | links | planar two-link dynamics; quill and wrist on their own |
+//! | end effector | [`Mode`] in X and Y, rigid in Z; its mass pulls back at the arm |
+//!
+//! The mechanics run in SI units at 24 kHz (RK4). Gravity is balanced, friction
+//! and the gyroscopic pull of the wrist are left out.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::config::{FullConfig, JOINTS};
+use super::drive::{CYCLE_S, CYCLES_PER_TICK, Drive, Setpoint};
+use super::mode::Mode;
+
+/// Mechanical steps per drive cycle.
+const STEPS_PER_CYCLE: u32 = 3;
+
+/// Mechanical step in seconds.
+const STEP_S: f64 = CYCLE_S / STEPS_PER_CYCLE as f64;
+
+/// SI units per unit of a joint: radians, and metres per millimetre.
+const SI: [f64; JOINTS] = [1.0, 1.0, 1e-3, 1.0];
+
+/// Ticks until the plant has carried out a setpoint: one of transport, one of
+/// interpolation. The output of call `k + 1` belongs to the setpoint of call `k`.
+pub const LATENCY_TICKS: usize = 2;
+
+// Layout of the mechanical state, metres and radians.
+const MOTOR: usize = 0;
+const LINK: usize = 4;
+const DEFLECTION: usize = 8;
+/// Rates follow the positions in the same order.
+const RATES: usize = 10;
+const STATES: usize = 20;
+
+type State = [f64; STATES];
+
+/// Setpoint of one tick: rad, rad, mm, rad and their derivatives.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointSetpoint {
+    /// Joint positions.
+    pub position: [f64; JOINTS],
+    /// Joint velocities.
+    pub velocity: [f64; JOINTS],
+    /// Joint accelerations.
+    pub acceleration: [f64; JOINTS],
+}
+
+impl JointSetpoint {
+    /// Standing still.
+    #[must_use]
+    pub fn at_rest(position: [f64; JOINTS]) -> Self {
+        Self {
+            position,
+            ..Self::default()
+        }
+    }
+
+    fn joint(&self, i: usize) -> Setpoint {
+        Setpoint {
+            position: self.position[i] * SI[i],
+            velocity: self.velocity[i] * SI[i],
+            acceleration: self.acceleration[i] * SI[i],
+        }
+    }
+}
+
+/// What the plant shows at the end of a tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PlantOutput {
+    /// Tool position in millimetres.
+    pub tool_mm: [f64; 3],
+    /// Tool acceleration in mm/s²: what an accelerometer reads.
+    pub tool_acceleration_mm_s2: [f64; 3],
+    /// Where the tool would be without the end effector's deflection, millimetres.
+    pub flange_mm: [f64; 3],
+    /// Link side of the joints: rad, rad, mm, rad.
+    pub joint_position: [f64; JOINTS],
+    /// Motor side of the joints, without noise: rad, rad, mm, rad.
+    pub motor_position: [f64; JOINTS],
+    /// Drives whose torque stands at its limit.
+    pub saturated: [bool; JOINTS],
+}
+
+/// The full plant; see the module.
+#[derive(Clone, Debug)]
+pub struct FullPlant {
+    config: FullConfig,
+    drives: [Drive; JOINTS],
+    pending: JointSetpoint,
+    state: State,
+    rng: ChaCha8Rng,
+}
+
+impl FullPlant {
+    /// At rest at the configuration's start.
+    #[must_use]
+    pub fn new(config: FullConfig) -> Self {
+        let start: [f64; JOINTS] = std::array::from_fn(|i| config.start[i] * SI[i]);
+        let mut state = [0.0; STATES];
+        state[MOTOR..LINK].copy_from_slice(&start);
+        state[LINK..DEFLECTION].copy_from_slice(&start);
+        Self {
+            drives: std::array::from_fn(|i| Drive::new(config.joints[i].drive, start[i])),
+            pending: JointSetpoint::at_rest(config.start),
+            rng: ChaCha8Rng::seed_from_u64(config.seed),
+            state,
+            config,
+        }
+    }
+
+    /// One control tick of 1 ms: carries out the setpoint of the last call, takes
+    /// up this one, and shows the state at the end of the tick.
+    pub fn step(&mut self, setpoint: JointSetpoint) -> PlantOutput {
+        for (i, drive) in self.drives.iter_mut().enumerate() {
+            drive.latch(self.pending.joint(i));
+        }
+        self.pending = setpoint;
+        for cycle in 0..CYCLES_PER_TICK {
+            let mut torque = [0.0; JOINTS];
+            for (i, drive) in self.drives.iter_mut().enumerate() {
+                let noise = self.config.joints[i].encoder_noise * self.rng.random_range(-1.0..=1.0);
+                torque[i] = drive.cycle(cycle, self.state[MOTOR + i] + noise);
+            }
+            let mode = self.mode();
+            for _ in 0..STEPS_PER_CYCLE {
+                self.state = self.runge_kutta(&self.state, &torque, mode);
+            }
+        }
+        self.output()
+    }
+
+    /// The plant now.
+    #[must_use]
+    pub fn output(&self) -> PlantOutput {
+        let s = &self.state;
+        let flange_mm = self.flange_mm();
+        let mode = self.mode();
+        let swing = |axis: usize| {
+            let (w, rate) = (s[DEFLECTION + axis], s[RATES + DEFLECTION + axis]);
+            mode.acceleration(w, rate) * 1e3
+        };
+        let quill = self.spring(s, 2) / self.config.joints[2].link_inertia * 1e3;
+        PlantOutput {
+            tool_mm: [
+                flange_mm[0] + s[DEFLECTION] * 1e3,
+                flange_mm[1] + s[DEFLECTION + 1] * 1e3,
+                flange_mm[2],
+            ],
+            tool_acceleration_mm_s2: [swing(0), swing(1), quill],
+            flange_mm,
+            joint_position: std::array::from_fn(|i| s[LINK + i] / SI[i]),
+            motor_position: std::array::from_fn(|i| s[MOTOR + i] / SI[i]),
+            saturated: std::array::from_fn(|i| self.drives[i].saturated()),
+        }
+    }
+
+    /// Deflects the end effector in X and Y and lets go.
+    pub fn pluck(&mut self, deflection_mm: [f64; 2]) {
+        for (axis, mm) in deflection_mm.into_iter().enumerate() {
+            self.state[DEFLECTION + axis] = mm * 1e-3;
+            self.state[RATES + DEFLECTION + axis] = 0.0;
+        }
+    }
+
+    /// Mechanical energy in joules.
+    #[must_use]
+    pub fn energy_j(&self) -> f64 {
+        let s = &self.state;
+        let rate = |i: usize| s[RATES + i];
+        let mut energy = self
+            .config
+            .inertia
+            .kinetic_j(s[LINK + 1], [rate(LINK), rate(LINK + 1)]);
+        for (i, joint) in self.config.joints.iter().enumerate() {
+            energy += 0.5 * joint.drive.motor_inertia * rate(MOTOR + i).powi(2);
+            energy += 0.5 * joint.stiffness * (s[MOTOR + i] - s[LINK + i]).powi(2);
+            if i >= 2 {
+                energy += 0.5 * joint.link_inertia * rate(LINK + i).powi(2);
+            }
+        }
+        let jacobian = self.config.arm.jacobian(self.links(s));
+        let omega = self.mode().omega();
+        for (axis, row) in jacobian.iter().enumerate() {
+            let flange = 1e-3 * (row[0] * rate(LINK) + row[1] * rate(LINK + 1));
+            let speed = flange + rate(DEFLECTION + axis);
+            let swing = omega * s[DEFLECTION + axis];
+            energy += 0.5 * self.config.tool_mass_kg * (speed * speed + swing * swing);
+        }
+        energy
+    }
+
+    fn flange_mm(&self) -> [f64; 3] {
+        let pose = self.config.arm.forward(self.links(&self.state));
+        [pose[0], pose[1], pose[2]]
+    }
+
+    fn mode(&self) -> Mode {
+        self.config.mode.at(self.flange_mm())
+    }
+
+    /// Link side of the joints in rad, rad, mm, rad.
+    fn links(&self, s: &State) -> [f64; JOINTS] {
+        std::array::from_fn(|i| s[LINK + i] / SI[i])
+    }
+
+    /// Torque that joint `i` passes from motor to link.
+    fn spring(&self, s: &State, i: usize) -> f64 {
+        let joint = &self.config.joints[i];
+        joint.stiffness * (s[MOTOR + i] - s[LINK + i])
+            + joint.damping * (s[RATES + MOTOR + i] - s[RATES + LINK + i])
+    }
+
+    fn derivative(&self, s: &State, torque: &[f64; JOINTS], mode: Mode) -> State {
+        let config = &self.config;
+        let mut d = [0.0; STATES];
+        d[..RATES].copy_from_slice(&s[RATES..]);
+        let spring: [f64; JOINTS] = std::array::from_fn(|i| self.spring(s, i));
+        for (i, joint) in config.joints.iter().enumerate() {
+            d[RATES + MOTOR + i] = (torque[i] - spring[i]) / joint.drive.motor_inertia;
+            d[RATES + LINK + i] = spring[i] / joint.link_inertia;
+        }
+        // The swinging mass accelerates by ÿ and pulls back with −m ÿ.
+        let swing: [f64; 2] = std::array::from_fn(|axis| {
+            mode.acceleration(s[DEFLECTION + axis], s[RATES + DEFLECTION + axis])
+        });
+        let q = self.links(s);
+        let jacobian = config.arm.jacobian(q);
+        let load = |joint: usize| {
+            let lever = jacobian[0][joint] * swing[0] + jacobian[1][joint] * swing[1];
+            spring[joint] - config.tool_mass_kg * 1e-3 * lever
+        };
+        let rates = [s[RATES + LINK], s[RATES + LINK + 1]];
+        let links = config
+            .inertia
+            .acceleration(s[LINK + 1], rates, [load(0), load(1)]);
+        let flange = config.arm.tool_acceleration(q, rates, links);
+        for axis in 0..2 {
+            d[RATES + LINK + axis] = links[axis];
+            d[RATES + DEFLECTION + axis] = swing[axis] - flange[axis] * 1e-3;
+        }
+        d
+    }
+
+    fn runge_kutta(&self, s: &State, torque: &[f64; JOINTS], mode: Mode) -> State {
+        let ahead = |d: &State, h: f64| -> State { std::array::from_fn(|i| s[i] + h * d[i]) };
+        let d1 = self.derivative(s, torque, mode);
+        let d2 = self.derivative(&ahead(&d1, STEP_S / 2.0), torque, mode);
+        let d3 = self.derivative(&ahead(&d2, STEP_S / 2.0), torque, mode);
+        let d4 = self.derivative(&ahead(&d3, STEP_S), torque, mode);
+        std::array::from_fn(|i| s[i] + STEP_S / 6.0 * (d1[i] + 2.0 * (d2[i] + d3[i]) + d4[i]))
+    }
+}

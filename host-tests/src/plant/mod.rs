@@ -1,0 +1,20 @@
+//! Plants: robots in double precision that answer the planner's setpoints.
+//!
+//! The *vibration* of either plant is the acceleration of its tool, as an
+//! accelerometer there reads it ([`crate::vibration`]).
+
+pub mod arm;
+pub mod config;
+pub mod drive;
+pub mod full;
+pub mod ideal;
+pub mod mode;
+
+#[cfg(test)]
+mod full_tests;
+
+pub use arm::{Elbow, ScaraArm};
+pub use config::{FullConfig, ModeMap};
+pub use full::{FullPlant, JointSetpoint, PlantOutput};
+pub use ideal::{IdealOutput, IdealPlant};
+pub use mode::Mode;

@@ -1,0 +1,392 @@
+//! Robot files: TOML to settings of planner and plant.
+//!
+//! Every key is optional and carries its unit; unknown keys are refused. An error names
+//! the file, the line and the key.
+
+use std::fmt;
+use std::path::Path;
+
+use planner_core::config::{ConfigError, Robot, RobotConfig};
+use planner_core::kinematics::{Elbow, JointRange, ScaraError};
+use planner_core::prefilter::{Kind, PrefilterError};
+use serde::{Deserialize, Deserializer};
+
+use crate::plant::Mode;
+use crate::plant_config::PlantConfig;
+use crate::toml_place::{key_at, line_at, line_of};
+
+/// Text of the default robot's file.
+pub const DEFAULT_ROBOT: &str = include_str!("../robots/scara-200-150.toml");
+
+/// What a robot file says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RobotSettings {
+    /// For the planner.
+    pub robot: RobotConfig,
+    /// For the simulated robot.
+    pub plant: PlantConfig,
+}
+
+/// Why a robot file cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RobotFileError {
+    /// The file's name.
+    pub file: String,
+    /// Line, from 1; none if the value at fault is a default.
+    pub line: Option<usize>,
+    /// Key with its table, as in `prefilter.damping`; none if the text is no TOML.
+    pub key: Option<String>,
+    /// What is wrong.
+    pub reason: String,
+}
+
+impl fmt::Display for RobotFileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.file)?;
+        if let Some(line) = self.line {
+            write!(f, ", line {line}")?;
+        }
+        if let Some(key) = &self.key {
+            write!(f, ", key {key}")?;
+        }
+        write!(f, ": {}", self.reason)
+    }
+}
+
+impl std::error::Error for RobotFileError {}
+
+impl RobotSettings {
+    /// Reads the file, or the default robot if there is none.
+    ///
+    /// # Errors
+    /// [`RobotFileError`] says what cannot be used.
+    pub fn load(file: Option<&Path>) -> Result<Self, RobotFileError> {
+        let Some(file) = file else {
+            return Self::parse("scara-200-150.toml", DEFAULT_ROBOT);
+        };
+        let name = file.display().to_string();
+        let unreadable = |reason: String| RobotFileError {
+            file: name.clone(),
+            line: None,
+            key: None,
+            reason,
+        };
+        let bytes = std::fs::read(file)
+            .map_err(|error| unreadable(format!("the robot file cannot be read ({error})")))?;
+        let text = String::from_utf8(bytes)
+            .map_err(|_| unreadable("the robot file is not UTF-8: save it as UTF-8 text".into()))?;
+        Self::parse(&name, &text)
+    }
+
+    /// Reads a file's text and checks that a robot can be made from it.
+    ///
+    /// # Errors
+    /// [`RobotFileError`] names the first key that cannot be used.
+    pub fn parse(file: &str, text: &str) -> Result<Self, RobotFileError> {
+        let tables: Tables = toml::from_str(text).map_err(|error| {
+            let offset = error.span().map(|span| span.start);
+            RobotFileError {
+                file: file.into(),
+                line: offset.map(|offset| line_at(text, offset)),
+                key: offset.and_then(|offset| key_at(text, offset)),
+                reason: error.message().trim().replace('\n', ", "),
+            }
+        })?;
+        let settings = tables.settings();
+        let refused = |keys: &[&str], reason: String| {
+            let present = keys.iter().find(|key| line_of(text, key).is_some());
+            let key = present.or(keys.first()).copied();
+            RobotFileError {
+                file: file.into(),
+                line: key.and_then(|key| line_of(text, key)),
+                key: key.map(Into::into),
+                reason,
+            }
+        };
+        Robot::new(&settings.robot)
+            .map_err(|error| refused(&keys_of(&error), error.to_string()))?;
+        settings
+            .plant
+            .check()
+            .map_err(|error| refused(&[error.key], error.to_string()))?;
+        Ok(settings)
+    }
+}
+
+/// The keys that an error of the core is about, the likeliest first.
+fn keys_of(error: &ConfigError) -> Vec<&'static str> {
+    match error {
+        ConfigError::Scara(error) => match error {
+            ScaraError::Link1 => vec!["arm.link1_mm"],
+            ScaraError::Link2 => vec!["arm.link2_mm"],
+            ScaraError::Reach => vec!["arm.link1_mm", "arm.link2_mm"],
+            ScaraError::SingularityMargin => vec!["arm.singularity_margin_deg"],
+            ScaraError::JointLimits(1) => vec!["arm.joint1"],
+            ScaraError::JointLimits(2) => vec!["arm.joint2"],
+            ScaraError::JointLimits(3) => vec!["arm.joint3"],
+            ScaraError::JointLimits(_) => vec!["arm.joint4"],
+            ScaraError::ElbowSide => vec!["arm.joint2", "arm.elbow"],
+        },
+        ConfigError::Prefilter(error) => match error {
+            PrefilterError::Frequency { .. } => vec!["prefilter.frequency_hz"],
+            PrefilterError::Damping { .. } => vec!["prefilter.damping"],
+            PrefilterError::TooLong { .. } => vec!["prefilter.frequency_hz", "prefilter.name"],
+        },
+        ConfigError::Range { name, .. } => match *name {
+            "tolerance" => vec!["motion.corner_tolerance_mm"],
+            "rapid" => vec!["motion.rapid_mm_s"],
+            "feed-limit" => vec!["motion.feed_limit_mm_s"],
+            _ => vec!["motion.yaw_limit_deg_s"],
+        },
+    }
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct Tables {
+    arm: ArmTable,
+    prefilter: PrefilterTable,
+    motion: MotionTable,
+    plant: PlantTable,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct ArmTable {
+    link1_mm: Option<f32>,
+    link2_mm: Option<f32>,
+    elbow: Option<ElbowName>,
+    singularity_margin_deg: Option<f32>,
+    joint1: TurnTable,
+    joint2: TurnTable,
+    joint3: QuillTable,
+    joint4: TurnTable,
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "lowercase")]
+enum ElbowName {
+    Left,
+    Right,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct TurnTable {
+    min_deg: Option<f32>,
+    max_deg: Option<f32>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct QuillTable {
+    min_mm: Option<f32>,
+    max_mm: Option<f32>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct PrefilterTable {
+    #[serde(deserialize_with = "prefilter_name")]
+    name: Option<Kind>,
+    frequency_hz: Option<f32>,
+    damping: Option<f32>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct MotionTable {
+    corner_tolerance_mm: Option<f32>,
+    rapid_mm_s: Option<f32>,
+    feed_limit_mm_s: Option<f32>,
+    yaw_limit_deg_s: Option<f32>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct PlantTable {
+    mode_frequency_hz: Option<f64>,
+    mode_damping: Option<f64>,
+    mode_slope_hz_per_mm: Option<f64>,
+    mode_reference_mm: Option<f64>,
+    tool_mass_kg: Option<f64>,
+    encoder_noise_rad: Option<f64>,
+    encoder_noise_mm: Option<f64>,
+    noise_seed: Option<u64>,
+}
+
+fn prefilter_name<'de, D: Deserializer<'de>>(text: D) -> Result<Option<Kind>, D::Error> {
+    let name = String::deserialize(text)?;
+    let known = || Kind::ALL.map(Kind::name).join(", ");
+    let unknown = || format!("there is no prefilter `{name}`: give one of {}", known());
+    let kind = Kind::from_name(&name).ok_or_else(|| serde::de::Error::custom(unknown()))?;
+    Ok(Some(kind))
+}
+
+impl Tables {
+    fn settings(&self) -> RobotSettings {
+        let mut robot = RobotConfig::default();
+        let arm = &self.arm;
+        let scara = &mut robot.scara;
+        set(&mut scara.link1_mm, arm.link1_mm);
+        set(&mut scara.link2_mm, arm.link2_mm);
+        set(&mut scara.elbow, arm.elbow.map(Elbow::from));
+        set(
+            &mut scara.singularity_margin_deg,
+            arm.singularity_margin_deg,
+        );
+        let travels = [
+            (arm.joint1.min_deg, arm.joint1.max_deg),
+            (arm.joint2.min_deg, arm.joint2.max_deg),
+            (arm.joint3.min_mm, arm.joint3.max_mm),
+            (arm.joint4.min_deg, arm.joint4.max_deg),
+        ];
+        for (JointRange { min, max }, travel) in scara.joint_limits.iter_mut().zip(travels) {
+            set(min, travel.0);
+            set(max, travel.1);
+        }
+        set(&mut robot.prefilter.kind, self.prefilter.name);
+        set(
+            &mut robot.prefilter.frequency_hz,
+            self.prefilter.frequency_hz,
+        );
+        set(&mut robot.prefilter.damping, self.prefilter.damping);
+        let motion = &self.motion;
+        set(&mut robot.corner_tolerance_mm, motion.corner_tolerance_mm);
+        set(&mut robot.rapid_mm_s, motion.rapid_mm_s);
+        set(&mut robot.feed_limit_mm_s, motion.feed_limit_mm_s);
+        set(&mut robot.yaw_limit_deg_s, motion.yaw_limit_deg_s);
+        RobotSettings {
+            plant: self.plant.config(&robot),
+            robot,
+        }
+    }
+}
+
+impl PlantTable {
+    fn config(&self, robot: &RobotConfig) -> PlantConfig {
+        let mut plant = PlantConfig {
+            link1_mm: robot.scara.link1_mm.into(),
+            link2_mm: robot.scara.link2_mm.into(),
+            ..PlantConfig::default()
+        };
+        let Mode {
+            frequency_hz,
+            damping,
+        } = &mut plant.mode;
+        set(frequency_hz, self.mode_frequency_hz);
+        set(damping, self.mode_damping);
+        set(&mut plant.mode_slope_hz_per_mm, self.mode_slope_hz_per_mm);
+        set(&mut plant.mode_reference_mm, self.mode_reference_mm);
+        set(&mut plant.tool_mass_kg, self.tool_mass_kg);
+        set(&mut plant.encoder_noise_rad, self.encoder_noise_rad);
+        set(&mut plant.encoder_noise_mm, self.encoder_noise_mm);
+        set(&mut plant.noise_seed, self.noise_seed);
+        plant
+    }
+}
+
+impl From<ElbowName> for Elbow {
+    fn from(name: ElbowName) -> Self {
+        match name {
+            ElbowName::Left => Self::Left,
+            ElbowName::Right => Self::Right,
+        }
+    }
+}
+
+fn set<T>(slot: &mut T, value: Option<T>) {
+    if let Some(value) = value {
+        *slot = value;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_file_states_the_defaults() {
+        let shipped = RobotSettings::load(None).unwrap();
+        assert_eq!(shipped, RobotSettings::parse("empty", "").unwrap());
+        assert_eq!(shipped.robot, RobotConfig::default());
+        assert_eq!(shipped.plant, PlantConfig::default());
+    }
+
+    #[test]
+    fn keys_reach_their_settings() {
+        let text = "[arm]\nelbow = 'left'\nlink2_mm = 180\njoint2.min_deg = -150\n\
+                    [prefilter]\nname = 'ZV'\n[plant]\nmode_damping = 0.1\nnoise_seed = 7";
+        let found = RobotSettings::parse("r.toml", text).unwrap();
+        assert_eq!(found.robot.scara.elbow, Elbow::Left);
+        assert_eq!(found.robot.scara.joint_limits[1].min, -150.0);
+        assert_eq!(found.robot.prefilter.kind, Kind::Zv);
+        assert_eq!((found.plant.link1_mm, found.plant.link2_mm), (200.0, 180.0));
+        assert_eq!((found.plant.mode.damping, found.plant.noise_seed), (0.1, 7));
+    }
+
+    #[test]
+    fn errors_name_file_line_and_key() {
+        for (text, expected) in [
+            (
+                "[arm]\nlink3_mm = 1",
+                "r.toml, line 2, key arm.link3_mm: unknown field",
+            ),
+            ("\n[legs]", "r.toml, line 2, key legs: unknown field `legs`"),
+            (
+                "[arm]\n\nlink1_mm = 'long'",
+                "r.toml, line 3, key arm.link1_mm: invalid type",
+            ),
+            (
+                "[arm]\nelbow = 'up'",
+                "r.toml, line 2, key arm.elbow: unknown variant",
+            ),
+            (
+                "[prefilter]\nname = 'zvx'",
+                "key prefilter.name: there is no prefilter `zvx`",
+            ),
+            ("arm = 3", "r.toml, line 1, key arm: invalid type"),
+            (
+                "[arm]\nlink1_mm = 5",
+                "r.toml, line 2, key arm.link1_mm: link 1 must be",
+            ),
+            (
+                "[arm]\nlink2_mm = 1900",
+                "r.toml, line 2, key arm.link2_mm: the links must not",
+            ),
+            (
+                "[arm.joint4]\nmin_deg = 9e9",
+                "r.toml, line 1, key arm.joint4: the limits of joint 4",
+            ),
+            (
+                "[prefilter]\ndamping = nan",
+                "r.toml, line 2, key prefilter.damping: the prefilter's",
+            ),
+            (
+                "[prefilter]\nfrequency_hz = 1",
+                "line 2, key prefilter.frequency_hz: the prefilter is",
+            ),
+            (
+                "[motion]\n\nrapid_mm_s = 0",
+                "r.toml, line 3, key motion.rapid_mm_s: the setting rapid",
+            ),
+            (
+                "plant.mode_damping = 2",
+                "r.toml, line 1, key plant.mode_damping: 2 is outside 0 to 0.9",
+            ),
+            ("[arm\n", "r.toml, line 1: "),
+        ] {
+            let error = RobotSettings::parse("r.toml", text)
+                .unwrap_err()
+                .to_string();
+            assert!(error.contains(expected), "{text:?}: {error}");
+            assert!(!error.contains('\n'), "{error}");
+        }
+        let missing = RobotSettings::load(Some(Path::new("no/such.toml"))).unwrap_err();
+        assert!(
+            missing
+                .to_string()
+                .starts_with("no/such.toml: the robot file cannot be read")
+        );
+    }
+}

@@ -1,0 +1,128 @@
+//! The software loop: the unchanged core, stepped in one process.
+
+use std::fmt;
+
+use planner_core::config::Robot;
+use planner_core::motion::{DelayLines, Motion, MotionState, Setpoint};
+use planner_core::planner::{Accepted, LineError, Planner};
+use planner_core::raw::SegmentQueue;
+
+/// Why a program does not run; nothing has moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ProgramError {
+    /// A line is refused.
+    Line(LineError),
+    /// The program holds no motion.
+    Empty,
+}
+
+impl fmt::Display for ProgramError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(error) => error.fmt(f),
+            Self::Empty => f.write_str(
+                "the program holds no motion: it needs a first G0 or G1 point and a move from there",
+            ),
+        }
+    }
+}
+
+impl std::error::Error for ProgramError {}
+
+impl From<LineError> for ProgramError {
+    fn from(error: LineError) -> Self {
+        Self::Line(error)
+    }
+}
+
+/// Plans the whole program without moving: what [`run`] refuses, before anything moves.
+///
+/// # Errors
+/// [`ProgramError`] names the first line that is refused.
+pub fn check(robot: &Robot, program: &str) -> Result<(), ProgramError> {
+    let mut queue = SegmentQueue::new();
+    let (producer, mut consumer) = queue.split();
+    let mut planner = Planner::new(robot, producer);
+    let mut moves = false;
+    for line in program.lines() {
+        match planner.line(line.as_bytes())? {
+            Accepted::End => break,
+            Accepted::Queued => moves = true,
+            Accepted::Nothing | Accepted::Reference(_) => {}
+        }
+        while consumer.dequeue().is_some() {}
+    }
+    if moves {
+        Ok(())
+    } else {
+        Err(ProgramError::Empty)
+    }
+}
+
+/// Runs a program through planner and tick, and hands each tick's setpoint to `each`.
+///
+/// See [`Controller::run`].
+///
+/// # Errors
+/// [`ProgramError`], before anything moves.
+pub fn run(robot: &Robot, program: &str, each: impl FnMut(&Setpoint)) -> Result<(), ProgramError> {
+    check(robot, program)?;
+    let mut queue = SegmentQueue::new();
+    let mut filters = Box::new(DelayLines::new());
+    Controller::new(robot, &mut queue, &mut filters).run(program, each)?;
+    Ok(())
+}
+
+/// A controller as the firmware wires it, stepped by its caller: it may run one program
+/// after the other.
+pub struct Controller<'q> {
+    planner: Planner<'q>,
+    motion: Motion<'q>,
+}
+
+impl<'q> Controller<'q> {
+    /// A controller that has seen no line, around a queue and delay lines that are new.
+    pub fn new(robot: &Robot, queue: &'q mut SegmentQueue, filters: &'q mut DelayLines) -> Self {
+        let (producer, consumer) = queue.split();
+        Self {
+            planner: Planner::new(robot, producer),
+            motion: Motion::new(robot, consumer, filters),
+        }
+    }
+
+    /// Changes the settings, between two programs.
+    pub fn set_robot(&mut self, robot: &Robot) {
+        self.planner.set_robot(robot);
+        self.motion.set_robot(robot);
+    }
+
+    /// Runs a program to its end and hands each tick's setpoint to `each`.
+    ///
+    /// The queue is kept full, as a sender does that heeds `ok`; motion starts when the queue
+    /// is full or the program has ended. The first setpoint is the one at rest where the
+    /// motion starts, the last one its end at rest.
+    ///
+    /// # Errors
+    /// The first line that is refused. What was queued before it may have moved: [`check`]
+    /// the program first.
+    pub fn run(&mut self, program: &str, mut each: impl FnMut(&Setpoint)) -> Result<(), LineError> {
+        let mut lines = program.lines();
+        let mut more = true;
+        loop {
+            while more && self.planner.has_room() {
+                match lines.next().map(|line| self.planner.line(line.as_bytes())) {
+                    Some(Ok(Accepted::Reference(pose))) => self.motion.place(pose),
+                    Some(Ok(Accepted::End)) | None => more = false,
+                    Some(Ok(Accepted::Nothing | Accepted::Queued)) => {}
+                    Some(Err(error)) => return Err(error),
+                }
+            }
+            self.motion.start();
+            let setpoint = self.motion.tick();
+            each(&setpoint);
+            if setpoint.state == MotionState::Idle && !more {
+                return Ok(());
+            }
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! The figures of a run, as `summary.json` and `--json` give them.
+
+use std::path::Path;
+
+use anyhow::Result;
+use serde::Serialize;
+
+use crate::checker::Report;
+use crate::scenario::{Outcome, Scenario};
+
+/// Figures of a run.
+#[derive(Clone, Debug, Serialize, PartialEq)]
+pub struct Summary {
+    /// The program's file.
+    pub program: String,
+    /// The prefilter's name.
+    pub prefilter: &'static str,
+    /// The prefilter's frequency.
+    pub frequency_hz: f32,
+    /// The prefilter's damping ratio.
+    pub damping: f32,
+    /// Corner tolerance where the program sets none.
+    pub tolerance_mm: f32,
+    /// `full` or `ideal`.
+    pub plant: &'static str,
+    /// `host` or `emulator`.
+    pub on: &'static str,
+    /// The figures themselves.
+    #[serde(flatten)]
+    pub figures: Figures,
+    /// Vibration as a fraction of that without a prefilter, on the same plant.
+    #[serde(flatten)]
+    pub ratios: Ratios,
+    /// Instructions of the dearest tick; null on the host.
+    pub tick_instructions_max: Option<u32>,
+}
+
+/// What is measured of each prefilter.
+#[derive(Clone, Copy, Debug, Serialize, PartialEq)]
+pub struct Figures {
+    /// Duration of the commanded motion.
+    pub cycle_time_s: f64,
+    /// From the commanded stop until the tool stays within 50 µm; null if it does not.
+    pub settling_time_s: Option<f64>,
+    /// Largest miss of a corner; null where the checker cannot read the program.
+    pub max_corner_error_mm: Option<f64>,
+    /// Largest distance of the command from the programmed path; null likewise.
+    pub max_path_deviation_mm: Option<f64>,
+    /// Maximum of the tool's acceleration, motion and 3 s more.
+    pub vibration_max_mm_s2: f64,
+    /// RMS of the same.
+    pub vibration_rms_mm_s2: f64,
+    /// Maximum in motion.
+    pub vibration_motion_max_mm_s2: f64,
+    /// RMS in motion.
+    pub vibration_motion_rms_mm_s2: f64,
+    /// Maximum after the stop.
+    pub vibration_residual_max_mm_s2: f64,
+    /// RMS over 3 s after the stop.
+    pub vibration_residual_rms_mm_s2: f64,
+    /// Largest acceleration setpoint of joint 1.
+    pub joint1_peak_rad_s2: f64,
+    /// Likewise of joint 2.
+    pub joint2_peak_rad_s2: f64,
+    /// Likewise of joint 3.
+    pub joint3_peak_mm_s2: f64,
+    /// Likewise of joint 4.
+    pub joint4_peak_rad_s2: f64,
+}
+
+/// Vibration as a fraction of that without a prefilter; null if that is zero.
+#[derive(Clone, Copy, Debug, Serialize, PartialEq)]
+pub struct Ratios {
+    /// Of the maximum.
+    pub vibration_max_ratio: Option<f64>,
+    /// Of the RMS.
+    pub vibration_rms_ratio: Option<f64>,
+    /// Of the maximum after the stop.
+    pub vibration_residual_ratio: Option<f64>,
+}
+
+impl Summary {
+    /// The figures of `outcome`, beside those without a prefilter.
+    #[must_use]
+    pub fn new(scenario: &Scenario, outcome: &Outcome, unfiltered: &Outcome) -> Self {
+        let robot = &scenario.settings.robot;
+        Self {
+            program: scenario.program.name.clone(),
+            prefilter: outcome.prefilter.name(),
+            frequency_hz: robot.prefilter.frequency_hz,
+            damping: robot.prefilter.damping,
+            tolerance_mm: robot.corner_tolerance_mm,
+            plant: scenario.plant.name(),
+            on: scenario.machine.name(),
+            figures: Figures::new(outcome),
+            ratios: Ratios::new(outcome, unfiltered),
+            tick_instructions_max: outcome.tick_instructions_max,
+        }
+    }
+
+    /// The program's file without its directory.
+    #[must_use]
+    pub fn program_name(&self) -> &str {
+        let name = Path::new(&self.program).file_name();
+        name.and_then(|name| name.to_str()).unwrap_or(&self.program)
+    }
+
+    /// The prefilter in words.
+    #[must_use]
+    pub fn prefilter_in_words(&self) -> String {
+        match self.prefilter {
+            "none" => "no prefilter".into(),
+            name => format!(
+                "{name} for {} Hz, damping {}",
+                self.frequency_hz, self.damping
+            ),
+        }
+    }
+
+    /// As JSON, one key a line.
+    ///
+    /// # Errors
+    /// Never in practice: all keys are text.
+    pub fn json(&self) -> Result<String> {
+        Ok(serde_json::to_string_pretty(self)?)
+    }
+}
+
+impl Figures {
+    /// The figures of a run.
+    #[must_use]
+    pub fn new(outcome: &Outcome) -> Self {
+        let report = outcome.checked.as_ref().ok().map(|(_, report)| report);
+        let vibration = outcome.vibration;
+        let [joint1, joint2, joint3, joint4] = outcome.joint_peaks.acceleration;
+        Self {
+            cycle_time_s: outcome.cycle_time_s,
+            settling_time_s: outcome.settling_time_s,
+            max_corner_error_mm: report.map(Report::max_corner_error_mm),
+            max_path_deviation_mm: report.map(|report| report.max_path_deviation_mm),
+            vibration_max_mm_s2: vibration.max_mm_s2,
+            vibration_rms_mm_s2: vibration.rms_mm_s2,
+            vibration_motion_max_mm_s2: vibration.motion_max_mm_s2,
+            vibration_motion_rms_mm_s2: vibration.motion_rms_mm_s2,
+            vibration_residual_max_mm_s2: vibration.residual_max_mm_s2,
+            vibration_residual_rms_mm_s2: vibration.residual_rms_mm_s2,
+            joint1_peak_rad_s2: joint1,
+            joint2_peak_rad_s2: joint2,
+            joint3_peak_mm_s2: joint3,
+            joint4_peak_rad_s2: joint4,
+        }
+    }
+}
+
+impl Ratios {
+    /// The ratios of a run to the one without a prefilter.
+    #[must_use]
+    pub fn new(outcome: &Outcome, unfiltered: &Outcome) -> Self {
+        let (with, without) = (&outcome.vibration, &unfiltered.vibration);
+        let ratio = |with: f64, without: f64| (without > 0.0).then_some(with / without);
+        Self {
+            vibration_max_ratio: ratio(with.max_mm_s2, without.max_mm_s2),
+            vibration_rms_ratio: ratio(with.rms_mm_s2, without.rms_mm_s2),
+            vibration_residual_ratio: ratio(with.residual_max_mm_s2, without.residual_max_mm_s2),
+        }
+    }
+}

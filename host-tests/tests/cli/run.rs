@@ -1,0 +1,239 @@
+//! `run`, `compare` and no command at all: figures and files.
+
+use std::fs;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use super::{corner_path, json, near, number, stillpoint};
+
+#[test]
+fn without_arguments_it_tells_and_draws() {
+    let here = TempDir::new().unwrap();
+    let output = stillpoint(&[]).current_dir(&here).output().unwrap();
+    assert!(output.status.success());
+    let said = String::from_utf8(output.stdout).unwrap();
+    for part in ["91 % lower", "stillpoint-out", "path.svg", "missed by 0.49"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    for file in [
+        "trace.csv",
+        "summary.json",
+        "path.svg",
+        "feedrate.svg",
+        "vibration.svg",
+    ] {
+        assert!(
+            here.path().join("stillpoint-out").join(file).is_file(),
+            "{file}"
+        );
+    }
+}
+
+#[test]
+fn run_writes_a_trace_that_agrees_with_its_summary() {
+    let out = TempDir::new().unwrap();
+    let directory = out.path().join("deeper/still");
+    let args = [
+        "run",
+        &corner_path(),
+        "--json",
+        "--out",
+        directory.to_str().unwrap(),
+    ];
+    let printed = json(&args);
+    let written = fs::read(directory.join("summary.json")).unwrap();
+    let summary: Value = serde_json::from_slice(&written).unwrap();
+    assert_eq!(printed, summary);
+    assert_eq!(summary["prefilter"], "fir-zvd");
+    assert_eq!(summary["on"], "host");
+    assert_eq!(summary["tick_instructions_max"], Value::Null);
+    near(&summary, "cycle_time_s", 3.988, 2e-3);
+    near(&summary, "settling_time_s", 0.0, 0.05);
+    near(&summary, "max_corner_error_mm", 0.4995, 5e-4);
+    near(&summary, "max_path_deviation_mm", 0.455, 5e-3);
+    near(&summary, "vibration_max_ratio", 0.09, 0.01);
+
+    let mut csv = csv::Reader::from_path(directory.join("trace.csv")).unwrap();
+    let header: Vec<_> = csv.headers().unwrap().iter().map(str::to_owned).collect();
+    assert_eq!(
+        header[..12].join(","),
+        "time_s,x_mm,y_mm,z_mm,c_deg,joint1,joint2,joint3,joint4,tool_x_mm,tool_y_mm,tool_z_mm"
+    );
+    let rows: Vec<Vec<f64>> = csv
+        .records()
+        .map(|row| {
+            row.unwrap()
+                .iter()
+                .map(|field| field.parse().unwrap())
+                .collect()
+        })
+        .collect();
+    let first = &rows[0];
+    let last = &rows[rows.len() - 1];
+    assert_eq!(first[1..5], [180.0, 0.0, 0.0, 0.0]);
+    assert_eq!(last[1..5], [270.0, 0.0, 0.0, 0.0]);
+    let stop = rows
+        .iter()
+        .rposition(|row| row[1..5] != last[1..5])
+        .unwrap()
+        + 1;
+    let cycle = number(&summary, "cycle_time_s");
+    assert!((rows[stop][0] - cycle).abs() < 5e-3);
+    assert!(last[0] - rows[stop][0] >= 2.999);
+    // One row a millisecond; fixed-point values exactly, joints that lead to the pose.
+    for (k, row) in rows.iter().enumerate() {
+        assert!((row[0] - k as f64 * 1e-3).abs() < 1e-9);
+        for value in &row[1..5] {
+            assert_eq!((value * 2_f64.powi(19)).fract(), 0.0);
+        }
+        for joint in [5, 6, 8] {
+            assert_eq!((row[joint] * 2_f64.powi(26)).fract(), 0.0);
+        }
+        let (q1, q12) = (row[5], row[5] + row[6]);
+        let x = 200.0 * q1.cos() + 150.0 * q12.cos();
+        let y = 200.0 * q1.sin() + 150.0 * q12.sin();
+        assert!((x - row[1]).hypot(y - row[2]) < 1e-4);
+    }
+    // The vibration is that of the trace, and the tool is where the summary says.
+    let magnitude = |row: &Vec<f64>| (row[12].powi(2) + row[13].powi(2) + row[14].powi(2)).sqrt();
+    let max = rows.iter().map(magnitude).fold(0.0, f64::max);
+    near(&summary, "vibration_max_mm_s2", max, 1e-2);
+    let square: f64 = rows.iter().map(|row| magnitude(row).powi(2)).sum();
+    near(
+        &summary,
+        "vibration_rms_mm_s2",
+        (square / rows.len() as f64).sqrt(),
+        1e-2,
+    );
+    let away = |row: &Vec<f64>| (row[9] - 270.0).hypot(row[10]) > 0.05;
+    assert!(rows.iter().rposition(away).unwrap() < stop);
+    for picture in ["path.svg", "feedrate.svg", "vibration.svg"] {
+        let text = fs::read_to_string(directory.join(picture)).unwrap();
+        assert!(text.starts_with("<svg") && text.trim_end().ends_with("</svg>"));
+        assert!(text.contains("corner-path.gcode"), "{picture}");
+    }
+}
+
+#[test]
+fn flags_override_the_robot_file() {
+    let here = TempDir::new().unwrap();
+    let robot = here.path().join("robot.toml");
+    fs::write(
+        &robot,
+        "[prefilter]\nname = 'zv'\nfrequency_hz = 5\n[motion]\ncorner_tolerance_mm = 0.2\n\
+         [plant]\nmode_frequency_hz = 5",
+    )
+    .unwrap();
+    let robot = robot.to_str().unwrap();
+    let path = corner_path();
+    let filed = json(&["run", &path, "--robot", robot, "--json"]);
+    assert_eq!(filed["prefilter"], "zv");
+    near(&filed, "frequency_hz", 5.0, 0.0);
+    near(&filed, "tolerance_mm", 0.2, 1e-6);
+    let flags = [
+        "run",
+        &path,
+        "--robot",
+        robot,
+        "--prefilter",
+        "zvd",
+        "--frequency",
+        "7",
+        "--damping",
+        "0.05",
+        "--tolerance",
+        "0",
+        "--plant",
+        "ideal",
+        "--on",
+        "host",
+        "--json",
+    ];
+    let flagged = json(&flags);
+    assert_eq!(flagged["prefilter"], "zvd");
+    assert_eq!(flagged["plant"], "ideal");
+    near(&flagged, "frequency_hz", 7.0, 0.0);
+    near(&flagged, "damping", 0.05, 1e-6);
+    near(&flagged, "tolerance_mm", 0.0, 0.0);
+    // Made for 7 Hz, the robot swings at 5: worse than made for 5.
+    assert!(
+        number(&flagged, "vibration_residual_ratio") > number(&filed, "vibration_residual_ratio")
+    );
+}
+
+#[test]
+fn compare_shows_all_prefilters() {
+    let compared = json(&["compare", &corner_path(), "--tolerance", "0.5", "--json"]);
+    let rows = compared["prefilters"].as_array().unwrap();
+    let names: Vec<_> = rows
+        .iter()
+        .map(|row| row["prefilter"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        names,
+        ["none", "zv", "zvd", "ei", "fir", "fir-zv", "fir-zvd"]
+    );
+    for row in rows {
+        assert_eq!(row["refused"], Value::Null);
+        for key in [
+            "cycle_time_s",
+            "settling_time_s",
+            "max_corner_error_mm",
+            "vibration_motion_max_mm_s2",
+            "vibration_motion_rms_mm_s2",
+            "vibration_residual_max_mm_s2",
+            "vibration_residual_rms_mm_s2",
+            "joint1_peak_rad_s2",
+            "joint2_peak_rad_s2",
+            "vibration_max_ratio",
+        ] {
+            assert!(number(row, key) >= 0.0, "{key}");
+        }
+    }
+    let output = stillpoint(&["compare", &corner_path()]).output().unwrap();
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success());
+    assert!(
+        names
+            .iter()
+            .all(|name| table.contains(&format!(" {name} "))),
+        "{table}"
+    );
+    // A prefilter that is too long is named, the others are shown.
+    let slow = json(&["compare", &corner_path(), "--frequency", "1.6", "--json"]);
+    let last = &slow["prefilters"][6];
+    assert!(
+        last["refused"]
+            .as_str()
+            .unwrap()
+            .contains("choose a shorter prefilter")
+    );
+    assert!(number(&slow["prefilters"][5], "cycle_time_s") > 4.0);
+}
+
+#[test]
+fn a_program_that_the_checker_cannot_read_runs_without_its_figures() {
+    let here = TempDir::new().unwrap();
+    let program = here.path().join("radius.gcode");
+    fs::write(&program, "G0 X250 Y0\nG3 X250 Y50 R30 F6000\nM2\n").unwrap();
+    let output = stillpoint(&["run", program.to_str().unwrap(), "--json"])
+        .output()
+        .unwrap();
+    assert!(output.status.success());
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        said.contains("the checker cannot judge this program (line 2: "),
+        "{said}"
+    );
+    let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(summary["max_path_deviation_mm"], Value::Null);
+    assert!(number(&summary, "cycle_time_s") > 0.5);
+}
+
+#[test]
+fn help_and_version_work() {
+    for args in [&["--help"][..], &["run", "--help"], &["--version"]] {
+        stillpoint(args).assert().success();
+    }
+}

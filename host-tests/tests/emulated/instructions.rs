@@ -1,0 +1,74 @@
+//! What the core costs on the Cortex-M4F, in instructions counted by the emulator.
+
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
+use crate::support::{images, installed};
+use host_tests::emulator::measure_instructions;
+
+/// The counts, measured once.
+fn counts() -> Option<&'static BTreeMap<String, u64>> {
+    static COUNTS: OnceLock<Option<BTreeMap<String, u64>>> = OnceLock::new();
+    COUNTS
+        .get_or_init(|| installed(measure_instructions(&images()?[1])))
+        .as_ref()
+}
+
+#[test]
+fn the_counter_counts() {
+    let Some(counts) = counts() else { return };
+    assert!(counts["nothing"] <= 1, "{counts:?}");
+    // A round is a whole number of instructions, however it is compiled, so that
+    // thousands of them show a miscount.
+    let per_2000 = counts["three-thousand-rounds"] - counts["thousand-rounds"];
+    let (rounds, rest) = ((per_2000 + 1000) / 2000, (per_2000 + 1000) % 2000);
+    assert!((2..20).contains(&rounds), "{counts:?}");
+    assert!(rest.abs_diff(1000) <= 2, "{counts:?}");
+}
+
+#[test]
+fn the_tick_stays_below_2000_instructions_on_the_corner_path() {
+    let Some(counts) = counts() else { return };
+    for filter in ["fir-zvd", "fir-zvd-0.1s", "fir-zvd-1s", "ei"] {
+        let tick = counts[&format!("tick/corner-path/{filter}")];
+        assert!((500..=2000).contains(&tick), "{filter}: {tick}");
+    }
+}
+
+#[test]
+fn the_tick_costs_the_same_whatever_the_filters_length_and_the_segments() {
+    let Some(counts) = counts() else { return };
+    for program in ["corner-path", "arcs", "half-millimetres"] {
+        let short = counts[&format!("tick/{program}/fir-zvd-0.1s")];
+        let long = counts[&format!("tick/{program}/fir-zvd-1s")];
+        // 1.05 times, in whole numbers
+        assert!(long * 20 <= short * 21, "{program}: {short}, {long}");
+    }
+    let corner_path = counts["tick/corner-path/fir-zvd"];
+    let half_millimetres = counts["tick/half-millimetres/fir-zvd"];
+    assert!(half_millimetres * 20 <= corner_path * 21);
+    // two arcs in flight all the time
+    assert!(counts["tick/arcs/fir-zvd"] <= 2500, "{counts:?}");
+}
+
+#[test]
+fn a_corner_stays_below_60_000_instructions() {
+    let Some(counts) = counts() else { return };
+    for (name, count) in counts {
+        if name.starts_with("corner/") {
+            assert!((100..=60_000).contains(count), "{name}: {count}");
+        }
+    }
+}
+
+#[test]
+fn lines_are_planned_at_a_thousand_a_second() {
+    // 170 MHz, up to 1.5 cycles an instruction
+    const INSTRUCTIONS_S: u64 = 113_000_000;
+    let Some(counts) = counts() else { return };
+    for (name, count) in counts {
+        if name.starts_with("line/") {
+            assert!(count * 1000 <= INSTRUCTIONS_S, "{name}: {count}");
+        }
+    }
+}

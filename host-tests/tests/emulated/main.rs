@@ -1,0 +1,6 @@
+//! Tests that run the firmware, and the core's cost, on the emulated board.
+
+mod firmware;
+mod instructions;
+mod same_bits;
+mod support;
