@@ -232,6 +232,21 @@ impl RobotConfig {
         Ok(())
     }
 
+    /// Sets one value by its number: of the setting's unit, or counting its names from 0. A
+    /// name or number that does not exist changes nothing.
+    pub(crate) fn set_value(&mut self, name: &str, value: f32) {
+        match self.slot(name) {
+            Some(Slot::Number(number)) => *number = value,
+            Some(Slot::Prefilter(kind)) => {
+                *kind = Kind::ALL.get(value as usize).copied().unwrap_or(*kind);
+            }
+            Some(Slot::Elbow(elbow)) => {
+                *elbow = ELBOWS.get(value as usize).copied().unwrap_or(*elbow);
+            }
+            None => {}
+        }
+    }
+
     /// The value of a setting; `None` if there is no setting of that name.
     #[must_use]
     pub fn value(&self, name: &str) -> Option<SettingValue> {
@@ -270,6 +285,9 @@ impl RobotConfig {
     }
 }
 
+/// Both sides, in the order of their numbers.
+const ELBOWS: [Elbow; 2] = [Elbow::Left, Elbow::Right];
+
 fn elbow_name(elbow: Elbow) -> &'static str {
     match elbow {
         Elbow::Left => "left",
@@ -278,7 +296,7 @@ fn elbow_name(elbow: Elbow) -> &'static str {
 }
 
 fn elbow_named(name: &str) -> Option<Elbow> {
-    [Elbow::Left, Elbow::Right]
+    ELBOWS
         .into_iter()
         .find(|elbow| elbow_name(*elbow).eq_ignore_ascii_case(name))
 }

@@ -15,7 +15,7 @@ pub const LINE_BYTES: usize = 254;
 
 const OVERFLOW: u8 = u8::MAX;
 
-/// Bytes taken from the port at once.
+/// Bytes that may be taken from the port at once, if [`Inbox::has_room`].
 pub const READ_BYTES: usize = 64;
 
 /// What one reading can add: a line that was almost complete, and shorter ones.
@@ -28,15 +28,18 @@ const CAPACITY: usize = RX_BYTES + RESERVE;
 pub type Line = heapless::Vec<u8, LINE_BYTES>;
 
 /// The mark of a line that did not fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLong;
 
 /// A queue of lines in one ring of bytes.
+#[derive(Debug, Default)]
 pub struct Inbox {
     records: Deque<u8, CAPACITY>,
 }
 
 impl Inbox {
     /// No lines.
+    #[must_use]
     pub const fn new() -> Self {
         Self {
             records: Deque::new(),
@@ -45,16 +48,19 @@ impl Inbox {
 
     /// Whether another reading would fit. If not, the sender ignores the flow
     /// control, and its bytes have to wait in the port.
+    #[must_use]
     pub fn has_room(&self) -> bool {
         self.records.len() + RESERVE <= CAPACITY
     }
 
     /// Whether no line waits.
+    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.records.is_empty()
     }
 
     /// Room in bytes, as the status reports it.
+    #[must_use]
     pub fn free_bytes(&self) -> usize {
         RX_BYTES.saturating_sub(self.records.len())
     }
@@ -77,6 +83,16 @@ impl Inbox {
         let _ = self.records.push_back(OVERFLOW);
     }
 
+    /// The first byte of the oldest line, 0 of an empty or lost one.
+    #[must_use]
+    pub fn first_byte(&self) -> Option<u8> {
+        let mut bytes = self.records.iter();
+        match bytes.next()? {
+            0 | &OVERFLOW => Some(0),
+            _ => bytes.next().copied(),
+        }
+    }
+
     /// The oldest line.
     pub fn pop(&mut self) -> Option<Result<Line, TooLong>> {
         match self.records.pop_front()? {
@@ -91,5 +107,38 @@ impl Inbox {
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.records.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    #[test]
+    fn lines_come_out_in_order_with_the_marks_of_the_lost() {
+        let mut inbox = Inbox::new();
+        inbox.push(b"G0 X1");
+        inbox.push_too_long();
+        inbox.push(b"");
+        inbox.push(&[b'x'; LINE_BYTES + 1]);
+        let all: Vec<_> = core::iter::from_fn(|| inbox.pop()).collect();
+        assert_eq!(all.len(), 4);
+        assert_eq!(all[0].as_deref(), Ok(b"G0 X1".as_slice()));
+        assert_eq!(all[1], Err(TooLong));
+        assert_eq!(all[2].as_deref(), Ok(b"".as_slice()));
+        assert_eq!(all[3], Err(TooLong));
+    }
+
+    #[test]
+    fn what_a_sender_may_have_under_way_always_fits() {
+        let mut inbox = Inbox::new();
+        let mut announced = 0;
+        while announced + LINE_BYTES < RX_BYTES {
+            assert!(inbox.has_room());
+            inbox.push(&[b'x'; LINE_BYTES]);
+            announced += LINE_BYTES + 1;
+        }
+        assert!(inbox.has_room());
     }
 }

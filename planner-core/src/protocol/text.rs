@@ -1,16 +1,17 @@
-//! An answer, put together before it is sent.
+//! A line of an answer, put together before it is sent.
 
 use core::fmt;
 
-/// The longest answer.
+/// The longest line, its end included.
 const CAPACITY: usize = 192;
 
 /// Text that is cut short rather than refused.
-#[derive(Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Text(heapless::Vec<u8, CAPACITY>);
 
 impl Text {
     /// `parts` and CRLF; cut so that the CRLF always has its place.
+    #[must_use]
     pub fn line(parts: fmt::Arguments<'_>) -> Self {
         let mut text = Self::default();
         // A full text is the only error, and a shortened sentence is what we want then.
@@ -21,6 +22,7 @@ impl Text {
     }
 
     /// The bytes to send.
+    #[must_use]
     pub fn as_bytes(&self) -> &[u8] {
         &self.0
     }
@@ -36,5 +38,17 @@ impl fmt::Write for Text {
         } else {
             Ok(())
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_line_is_cut_and_still_ends() {
+        let text = Text::line(format_args!("{:400}", "x"));
+        assert_eq!(text.as_bytes().len(), CAPACITY);
+        assert!(text.as_bytes().ends_with(b" \r\n"));
     }
 }

@@ -4,35 +4,40 @@
 //! begin when
 //! - the queue is full: the planner sees as far ahead as it ever will, or
 //! - the program is complete, or
-//! - no byte of a line has arrived for [`QUIET`]: somebody typed a line, or the
+//! - no byte of a line has arrived for [`QUIET_MS`]: somebody typed a line, or the
 //!   sender has no more to say before it sees something move. Realtime bytes do not
 //!   count: senders ask for the status all the time.
 
-use embassy_time::{Duration, Instant};
+/// In milliseconds. A sender that streams answers an `ok` much sooner.
+pub const QUIET_MS: u64 = 50;
 
-/// A sender that streams answers an `ok` much sooner than this.
-pub const QUIET: Duration = Duration::from_millis(50);
-
-/// Moves that wait for a start, and since when nothing was heard.
+/// Moves that wait for a start, and since when nothing was heard. Times are in ms.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct CycleStart {
     waiting: bool,
     complete: bool,
-    last_byte: Instant,
+    last_byte_ms: u64,
 }
 
 impl CycleStart {
     /// Nothing waits.
-    pub fn new(now: Instant) -> Self {
+    pub const fn new() -> Self {
         Self {
             waiting: false,
             complete: false,
-            last_byte: now,
+            last_byte_ms: 0,
         }
     }
 
     /// A byte of a line has arrived.
-    pub fn heard(&mut self, now: Instant) {
-        self.last_byte = now;
+    pub fn heard(&mut self, now_ms: u64) {
+        self.last_byte_ms = now_ms;
+    }
+
+    /// Nothing waits any more: what was queued is gone or began by another order.
+    pub fn forget(&mut self) {
+        self.waiting = false;
+        self.complete = false;
     }
 
     /// A move was queued.
@@ -52,14 +57,14 @@ impl CycleStart {
     }
 
     /// When to ask again, should nothing happen until then.
-    pub fn next_check(&self) -> Option<Instant> {
-        self.waiting.then(|| self.last_byte + QUIET)
+    pub fn next_check(&self) -> Option<u64> {
+        self.waiting.then(|| self.last_byte_ms + QUIET_MS)
     }
 
     /// Whether to start now; says so once.
-    pub fn is_due(&mut self, now: Instant, queue_is_full: bool) -> bool {
+    pub fn is_due(&mut self, now_ms: u64, queue_is_full: bool) -> bool {
         let complete = core::mem::take(&mut self.complete);
-        let due = self.waiting && (queue_is_full || complete || now >= self.last_byte + QUIET);
+        let due = self.waiting && (queue_is_full || complete || now_ms >= self.last_byte_ms + QUIET_MS);
         if due {
             self.waiting = false;
         }

@@ -1,0 +1,254 @@
+//! The serial loop: the unchanged protocol, planner and tick in one process, byte by byte and
+//! millisecond by millisecond.
+
+use std::collections::HashMap;
+
+use planner_core::config::Robot;
+use planner_core::motion::{DelayLines, Motion, Order, Setpoint};
+use planner_core::planner::Planner;
+use fixed::traits::ToFixed;
+use planner_core::pose::{JointPosition, Pose};
+use planner_core::protocol::inbox::READ_BYTES;
+use planner_core::protocol::{
+    Controller, Health, Identity, Inputs, RECORD_BYTES, Record, Report, Settings, Step,
+};
+use planner_core::raw::{LOOKAHEAD, SegmentQueue};
+
+/// What is kept over a restart, here in memory.
+pub type Records = HashMap<Record, Vec<u8>>;
+
+/// A controller with its motion, as the firmware wires them.
+pub struct SerialLoop<'q> {
+    controller: Controller<'q>,
+    motion: Motion<'q>,
+    report: Report,
+    now_ms: u64,
+    output: Vec<u8>,
+    /// What the next bytes find no room for: a port's buffer.
+    waiting: Vec<u8>,
+    /// What is kept.
+    pub records: Records,
+    /// The board's inputs, as the next tick reports them.
+    pub inputs: Inputs,
+    /// What absolute encoders read, if there are any.
+    pub encoders: Option<JointPosition>,
+    /// Whether what is to be kept is kept.
+    pub store_works: bool,
+    /// Banners said.
+    banners: u32,
+}
+
+/// Powers a controller up with what was kept, and hands it to `body` before its first tick.
+pub fn with_controller<R>(records: Records, body: impl FnOnce(&mut SerialLoop<'_>) -> R) -> R {
+    let mut queue = SegmentQueue::new();
+    let mut filters = Box::new(DelayLines::new());
+    let settings = Settings::default();
+    let robot = Robot::new(&settings.robot).expect("the default settings are a robot");
+    let (producer, consumer) = queue.split();
+    let identity = Identity {
+        board: "PC",
+        cost_unit: "ticks",
+        blocks: LOOKAHEAD,
+        stack_use: || (0, 0),
+    };
+    let mut controller = Controller::new(Planner::new(&robot, producer), settings, identity);
+    for record in Record::ALL {
+        if let Some(bytes) = records.get(&record) {
+            controller.restore(record, bytes);
+        }
+    }
+    let mut serial_loop = SerialLoop {
+        controller,
+        motion: Motion::new(&robot, consumer, &mut filters),
+        report: Report::default(),
+        now_ms: 0,
+        output: Vec::new(),
+        waiting: Vec::new(),
+        records,
+        inputs: Inputs::default(),
+        encoders: None,
+        store_works: true,
+        banners: 0,
+    };
+    body(&mut serial_loop)
+}
+
+impl SerialLoop<'_> {
+    /// Sends bytes; they arrive at once, as far as there is room.
+    pub fn send(&mut self, bytes: &[u8]) {
+        self.waiting.extend_from_slice(bytes);
+        self.serve();
+    }
+
+    /// Everything said since the last call.
+    pub fn heard(&mut self) -> String {
+        String::from_utf8_lossy(&std::mem::take(&mut self.output)).into_owned()
+    }
+
+    /// Sends a line and waits, for 60 s at the most, for its answer; returns all that was
+    /// said until then.
+    pub fn ask(&mut self, line: &str) -> String {
+        self.send(format!("{line}\n").as_bytes());
+        for _ in 0..60_000 {
+            let is_answer = |line: &str| line == "ok" || line.starts_with("error:");
+            if String::from_utf8_lossy(&self.output).lines().any(is_answer) {
+                break;
+            }
+            self.tick();
+        }
+        self.heard()
+    }
+
+    /// Lets time pass.
+    pub fn run_ms(&mut self, duration_ms: u64) {
+        for _ in 0..duration_ms {
+            self.tick();
+        }
+    }
+
+    /// Lets time pass until a report begins with `<state`, for 600 s at the most; returns
+    /// whether one did.
+    pub fn run_until(&mut self, state: &str) -> bool {
+        (0..600_000).any(|_| {
+            self.tick();
+            self.state().starts_with(state)
+        })
+    }
+
+    /// The state that a status report shows now.
+    pub fn state(&mut self) -> String {
+        let heard = std::mem::take(&mut self.output);
+        self.send(b"?");
+        let report = String::from_utf8_lossy(&std::mem::replace(&mut self.output, heard)).into_owned();
+        let start = report.rfind('<').map_or(0, |start| start + 1);
+        let end = report[start..].find('|').unwrap_or(0);
+        report[start..start + end].to_string()
+    }
+
+    /// Where the last accepted move ends, if the position is known.
+    pub fn target(&self) -> Option<Pose> {
+        self.controller.target()
+    }
+
+    /// Number of the last line with a checksum that was accepted.
+    pub fn last_line(&self) -> u32 {
+        self.controller.last_line()
+    }
+
+    /// Resets so far, and the start.
+    pub fn banners(&self) -> u32 {
+        self.banners
+    }
+
+    /// What encoders read with the tool at a point.
+    pub fn joints_at(&self, x_mm: f64, y_mm: f64) -> JointPosition {
+        let pose = Pose {
+            x: x_mm.to_fixed(),
+            y: y_mm.to_fixed(),
+            ..Pose::default()
+        };
+        let scara = &self.controller.robot().scara;
+        scara.inverse(&pose).expect("the point is within reach")
+    }
+
+    /// The setpoint of the last tick.
+    pub fn setpoint(&self) -> &Setpoint {
+        &self.report.setpoint
+    }
+
+    /// Like [`SerialLoop::send`]; `watch` sees every step of the controller.
+    pub fn send_watched(&mut self, bytes: &[u8], mut watch: impl FnMut(&Self)) {
+        self.waiting.extend_from_slice(bytes);
+        self.serve_watched(&mut watch);
+    }
+
+    /// One millisecond: a tick of the motion, and all that the controller has to do then.
+    pub fn tick(&mut self) {
+        self.tick_watched(|_| ());
+    }
+
+    /// Likewise; `watch` sees every step of the controller.
+    pub fn tick_watched(&mut self, mut watch: impl FnMut(&Self)) {
+        self.now_ms += 1;
+        let before = self.report.setpoint.pose;
+        let setpoint = self.motion.tick();
+        let step_mm = |to: planner_core::units::LengthMm, from| {
+            f64::from(to.saturating_sub(from).to_num::<f32>())
+        };
+        let pose = setpoint.pose;
+        let steps = [
+            step_mm(pose.x, before.x),
+            step_mm(pose.y, before.y),
+            step_mm(pose.z, before.z),
+        ];
+        let squared: f64 = steps.iter().map(|step| step * step).sum();
+        self.report = Report {
+            setpoint,
+            speed_mm_s: (squared.sqrt() * 1000.0) as f32,
+            orders: self.report.orders,
+            inputs: self.inputs,
+            encoders: self.encoders,
+            health: Health {
+                ticks: self.report.health.ticks.wrapping_add(1),
+                ..self.report.health
+            },
+        };
+        self.serve_watched(&mut watch);
+    }
+
+    /// Lets the controller do all it has to do now.
+    fn serve(&mut self) {
+        self.serve_watched(&mut |_| ());
+    }
+
+    /// Likewise; `watch` sees every step.
+    fn serve_watched(&mut self, watch: &mut impl FnMut(&Self)) {
+        loop {
+            while !self.waiting.is_empty() && self.controller.has_room() {
+                let count = self.waiting.len().min(READ_BYTES);
+                for byte in self.waiting.drain(..count) {
+                    self.controller.receive(byte, self.now_ms);
+                }
+                if !self.step() {
+                    break;
+                }
+                watch(self);
+            }
+            if !self.step() {
+                break;
+            }
+            watch(self);
+        }
+    }
+
+    /// One step of the controller; whether there was something to do.
+    fn step(&mut self) -> bool {
+        match self.controller.step(self.now_ms, &self.report) {
+            Step::Say(text) => {
+                self.banners += u32::from(text.as_bytes().starts_with(b"\r\nGrbl"));
+                self.output.extend_from_slice(text.as_bytes());
+            }
+            Step::Order(order) => self.obey(order),
+            Step::Robot => self.motion.set_robot(self.controller.robot()),
+            Step::Keep(record) => {
+                let mut buffer = [0; RECORD_BYTES];
+                let bytes = self.controller.record(record, &mut buffer).to_vec();
+                if self.store_works {
+                    self.records.insert(record, bytes);
+                }
+                self.controller.kept(self.store_works);
+            }
+            Step::ForgetRecords => {
+                self.records.clear();
+                self.controller.kept(true);
+            }
+            Step::Wait(_) => return false,
+        }
+        true
+    }
+
+    fn obey(&mut self, order: Order) {
+        self.motion.obey(order);
+        self.report.orders = self.report.orders.wrapping_add(1);
+    }
+}

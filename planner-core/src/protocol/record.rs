@@ -1,0 +1,40 @@
+//! What is kept over a restart.
+
+use crate::gcode::OFFSETS_BYTES;
+
+use super::settings::SETTINGS_BYTES;
+
+/// A piece of what is kept; it is read and written as a whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Record {
+    /// All settings.
+    Settings,
+    /// Work offsets and stored positions.
+    Offsets,
+    /// Start-up line 0 or 1.
+    StartupLine(u8),
+    /// The user's name for this controller.
+    BuildName,
+}
+
+/// Longest start-up line and build name in bytes.
+pub const TEXT_BYTES: usize = 80;
+
+/// A start-up line or a build name.
+pub type KeptText = heapless::String<TEXT_BYTES>;
+
+/// The longest record in bytes.
+pub const RECORD_BYTES: usize = 320;
+
+const _: () = assert!(SETTINGS_BYTES <= RECORD_BYTES && OFFSETS_BYTES <= RECORD_BYTES);
+
+impl Record {
+    /// Every record there is.
+    pub const ALL: [Self; 5] = [
+        Self::Settings,
+        Self::Offsets,
+        Self::StartupLine(0),
+        Self::StartupLine(1),
+        Self::BuildName,
+    ];
+}

@@ -1,0 +1,459 @@
+//! Every setting by number and by name: one table for reading, writing and self-description.
+//!
+//! Numbers below 1000 are Grbl's, for what means the same there; the robot's own begin at
+//! 1000. A value is given as a number everywhere; a choice may be given by its name too.
+
+use core::fmt;
+
+use crate::config::{RobotConfig, SettingError, SettingValue};
+use crate::prefilter::Kind as Prefilter;
+
+/// How the controller deals with its sender and its inputs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProtocolConfig {
+    /// What a status report holds: bit 0 machine instead of work position, bit 1 buffers.
+    pub report_mask: u8,
+    /// Lengths in reports are in inches.
+    pub report_inches: bool,
+    /// Status reports also hold the joint positions.
+    pub report_joints: bool,
+    /// A target that the robot cannot reach is not only refused: it raises alarm 2, as in
+    /// Grbl, so that a sender that ignores errors does not go on from elsewhere.
+    pub soft_limit_alarm: bool,
+    /// A limit input that becomes active in motion raises alarm 1.
+    pub hard_limits: bool,
+    /// The position is found by homing; until then the controller is locked.
+    pub homing: bool,
+    /// The drives have absolute encoders, which tell the position from the start.
+    pub encoders: bool,
+    /// After an `error:N` all further lines are refused until `$ACK`.
+    pub error_safe: bool,
+    /// Silence in s after which a running program is held; 0 waits for ever.
+    pub link_timeout_s: f32,
+}
+
+impl Default for ProtocolConfig {
+    fn default() -> Self {
+        Self {
+            report_mask: 3,
+            report_inches: false,
+            report_joints: false,
+            soft_limit_alarm: false,
+            hard_limits: false,
+            homing: false,
+            encoders: false,
+            error_safe: false,
+            link_timeout_s: 0.0,
+        }
+    }
+}
+
+/// All that `$$` lists.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Settings {
+    /// The robot and its prefilter.
+    pub robot: RobotConfig,
+    /// The controller's manners.
+    pub protocol: ProtocolConfig,
+}
+
+/// A setting's kind of value, with what is needed to check and to describe it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// 0 or 1.
+    Switch,
+    /// Bits, with a name for each.
+    Bits(&'static [&'static str]),
+    /// One of these names, counted from 0.
+    Choice(&'static [&'static str]),
+    /// A number within a range.
+    Decimal {
+        /// Lowest value.
+        low: f32,
+        /// Highest value.
+        high: f32,
+    },
+}
+
+/// One row of the table of settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// As in `$n=value`.
+    pub number: u16,
+    /// As in `$name=value`.
+    pub name: &'static str,
+    /// Index into [`GROUPS`].
+    pub group: u8,
+    /// For people, without the unit.
+    pub label: &'static str,
+    /// Empty if it has none.
+    pub unit: &'static str,
+    /// What values it takes.
+    pub kind: Kind,
+}
+
+/// Names of the groups of settings.
+pub const GROUPS: [&str; 5] = ["Reports", "Safety", "Link", "Robot", "Motion"];
+
+const REPORTS: u8 = 0;
+const SAFETY: u8 = 1;
+const LINK: u8 = 2;
+const ROBOT: u8 = 3;
+const MOTION: u8 = 4;
+
+const fn setting(
+    number: u16,
+    name: &'static str,
+    group: u8,
+    label: &'static str,
+    unit: &'static str,
+    kind: Kind,
+) -> Setting {
+    Setting {
+        number,
+        name,
+        group,
+        label,
+        unit,
+        kind,
+    }
+}
+
+const fn decimal(low: f32, high: f32) -> Kind {
+    Kind::Decimal { low, high }
+}
+
+const ELBOWS: &[&str] = &["left", "right"];
+const PREFILTERS: &[&str] = &{
+    let mut names = [""; Prefilter::ALL.len()];
+    let mut i = 0;
+    while i < names.len() {
+        names[i] = Prefilter::ALL[i].name();
+        i += 1;
+    }
+    names
+};
+
+/// The table, by number.
+pub const SETTINGS: [Setting; 28] = [
+    setting(
+        10,
+        "report",
+        REPORTS,
+        "Status report",
+        "",
+        Kind::Bits(&["Machine position", "Buffers"]),
+    ),
+    setting(11, "tolerance", MOTION, "Corner tolerance", "mm", decimal(0.0, 100.0)),
+    setting(13, "report-inches", REPORTS, "Report in inches", "", Kind::Switch),
+    setting(20, "soft-limit-alarm", SAFETY, "Alarm on a target out of reach", "", Kind::Switch),
+    setting(21, "hard-limits", SAFETY, "Alarm on a limit input in motion", "", Kind::Switch),
+    setting(22, "homing", SAFETY, "Locked until homed", "", Kind::Switch),
+    setting(1000, "encoders", SAFETY, "Drives have absolute encoders", "", Kind::Switch),
+    setting(1001, "error-safe", LINK, "Refuse lines after an error until $ACK", "", Kind::Switch),
+    setting(1002, "link-timeout", LINK, "Hold after silence, 0 never", "s", decimal(0.0, 3600.0)),
+    setting(1003, "report-joints", REPORTS, "Report joint positions", "", Kind::Switch),
+    setting(1010, "link1", ROBOT, "Upper arm", "mm", decimal(10.0, 1990.0)),
+    setting(1011, "link2", ROBOT, "Forearm", "mm", decimal(10.0, 1990.0)),
+    setting(1012, "elbow", ROBOT, "Elbow side", "", Kind::Choice(ELBOWS)),
+    setting(1013, "singularity-margin", ROBOT, "Joint 2 from its ends", "deg", decimal(0.5, 45.0)),
+    setting(1021, "joint1-min", ROBOT, "Joint 1 lower limit", "deg", decimal(-360.0, 360.0)),
+    setting(1022, "joint1-max", ROBOT, "Joint 1 upper limit", "deg", decimal(-360.0, 360.0)),
+    setting(1023, "joint2-min", ROBOT, "Joint 2 lower limit", "deg", decimal(-360.0, 360.0)),
+    setting(1024, "joint2-max", ROBOT, "Joint 2 upper limit", "deg", decimal(-360.0, 360.0)),
+    setting(1025, "joint3-min", ROBOT, "Joint 3 lower limit", "mm", decimal(-4000.0, 4000.0)),
+    setting(1026, "joint3-max", ROBOT, "Joint 3 upper limit", "mm", decimal(-4000.0, 4000.0)),
+    setting(1027, "joint4-min", ROBOT, "Joint 4 lower limit", "deg", decimal(-1080.0, 1080.0)),
+    setting(1028, "joint4-max", ROBOT, "Joint 4 upper limit", "deg", decimal(-1080.0, 1080.0)),
+    setting(1040, "prefilter", MOTION, "Prefilter", "", Kind::Choice(PREFILTERS)),
+    setting(1041, "frequency", MOTION, "Natural frequency to suppress", "Hz", decimal(0.01, 250.0)),
+    setting(1042, "damping", MOTION, "Damping ratio", "", decimal(0.0, 0.5)),
+    setting(1050, "rapid", MOTION, "Feedrate of G0", "mm/s", decimal(0.001, 10_000.0)),
+    setting(1051, "feed-limit", MOTION, "Fastest feedrate", "mm/s", decimal(0.001, 10_000.0)),
+    setting(1052, "yaw-limit", MOTION, "Fastest yaw", "deg/s", decimal(0.001, 10_000.0)),
+];
+
+/// Number and value of a setting, as kept.
+const PAIR_BYTES: usize = 6;
+
+/// All settings, as kept.
+pub const SETTINGS_BYTES: usize = SETTINGS.len() * PAIR_BYTES;
+
+impl Setting {
+    /// The setting of that number or name.
+    #[must_use]
+    pub fn find(key: &str) -> Option<&'static Self> {
+        match key.parse::<u16>() {
+            Ok(number) => SETTINGS.iter().find(|setting| setting.number == number),
+            Err(_) => SETTINGS
+                .iter()
+                .find(|setting| setting.name.eq_ignore_ascii_case(key)),
+        }
+    }
+
+    /// The value that a text gives, if it is one of this setting's.
+    fn read(&self, text: &str) -> Option<f32> {
+        if let Kind::Choice(names) = self.kind
+            && let Some(choice) = names.iter().position(|name| name.eq_ignore_ascii_case(text))
+        {
+            return Some(choice as f32);
+        }
+        text.parse().ok().filter(|value| self.takes(*value))
+    }
+
+    /// Whether a number is one of this setting's values.
+    fn takes(&self, value: f32) -> bool {
+        let whole_below = |end: u32| {
+            let is_whole = value as u32 as f32 == value;
+            is_whole && (0.0..end as f32).contains(&value)
+        };
+        match self.kind {
+            Kind::Switch => whole_below(2),
+            Kind::Bits(names) => whole_below(1 << names.len()),
+            Kind::Choice(names) => whole_below(names.len() as u32),
+            Kind::Decimal { low, high } => (low..=high).contains(&value),
+        }
+    }
+}
+
+/// `[SETTING:…]` of grblHAL's `$ES`: number, group, label, unit, type, format, range, whether
+/// a restart is needed and whether it may be empty.
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            number,
+            group,
+            label,
+            unit,
+            ..
+        } = self;
+        write!(f, "[SETTING:{number}|{group}|{label}|{unit}|")?;
+        match self.kind {
+            Kind::Switch => f.write_str("0|||")?,
+            Kind::Bits(names) => names_of(f, 1, names)?,
+            Kind::Choice(names) => names_of(f, 3, names)?,
+            Kind::Decimal { low, high } => write!(f, "6|###0.000|{low}|{high}")?,
+        }
+        f.write_str("|0|0]")
+    }
+}
+
+fn names_of(f: &mut fmt::Formatter<'_>, datatype: u8, names: &[&str]) -> fmt::Result {
+    write!(f, "{datatype}|")?;
+    for (i, name) in names.iter().enumerate() {
+        let comma = if i == 0 { "" } else { "," };
+        write!(f, "{comma}{name}")?;
+    }
+    f.write_str("||")
+}
+
+/// Where a setting's value is kept.
+enum Place<'a> {
+    Switch(&'a mut bool),
+    Bits(&'a mut u8),
+    Number(&'a mut f32),
+    Robot,
+}
+
+impl Settings {
+    /// Sets values from `key=value` texts between blanks, a key being a number or a name.
+    /// Whether a robot can be made of them is checked when one is.
+    ///
+    /// # Errors
+    /// [`SettingError`] if a key or a value cannot be used; nothing is changed then.
+    pub fn set_all(&mut self, text: &str) -> Result<(), SettingError> {
+        let mut changed = *self;
+        for pair in text.split_ascii_whitespace() {
+            let (key, value) = pair.split_once('=').ok_or(SettingError::Value)?;
+            let setting = Setting::find(key).ok_or(SettingError::Unknown)?;
+            changed.set(setting, setting.read(value).ok_or(SettingError::Value)?);
+        }
+        *self = changed;
+        Ok(())
+    }
+
+    /// The value of a setting as a number; a choice counts from 0.
+    #[must_use]
+    pub fn value(&self, setting: &Setting) -> f32 {
+        let mut copy = *self;
+        match copy.place(setting.name) {
+            Place::Switch(switch) => f32::from(u8::from(*switch)),
+            Place::Bits(bits) => f32::from(*bits),
+            Place::Number(number) => *number,
+            Place::Robot => match (self.robot.value(setting.name), setting.kind) {
+                (Some(SettingValue::Number(number)), _) => number,
+                (Some(SettingValue::Name(name)), Kind::Choice(names)) => {
+                    let choice = names.iter().position(|other| *other == name);
+                    choice.unwrap_or_default() as f32
+                }
+                _ => f32::NAN,
+            },
+        }
+    }
+
+    /// As kept over a restart: number and value of each setting, little-endian.
+    pub fn to_bytes<'b>(&self, buffer: &'b mut [u8; SETTINGS_BYTES]) -> &'b [u8] {
+        for (setting, place) in SETTINGS.iter().zip(buffer.chunks_exact_mut(PAIR_BYTES)) {
+            let (number, value) = place.split_at_mut(2);
+            number.copy_from_slice(&setting.number.to_le_bytes());
+            value.copy_from_slice(&self.value(setting).to_le_bytes());
+        }
+        buffer
+    }
+
+    /// The settings kept; those that are missing have their defaults, and numbers and values
+    /// that do not exist any more are passed over.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8]) -> Self {
+        let mut settings = Self::default();
+        for pair in bytes.chunks_exact(PAIR_BYTES) {
+            let [n0, n1, v0, v1, v2, v3] = *pair else {
+                continue;
+            };
+            let number = u16::from_le_bytes([n0, n1]);
+            let value = f32::from_le_bytes([v0, v1, v2, v3]);
+            let setting = SETTINGS.iter().find(|setting| setting.number == number);
+            if let Some(setting) = setting.filter(|setting| setting.takes(value)) {
+                settings.set(setting, value);
+            }
+        }
+        settings
+    }
+
+    /// Sets a value that [`Setting::takes`].
+    fn set(&mut self, setting: &Setting, value: f32) {
+        match self.place(setting.name) {
+            Place::Switch(switch) => *switch = value != 0.0,
+            Place::Bits(bits) => *bits = value as u8,
+            Place::Number(number) => *number = value,
+            Place::Robot => self.robot.set_value(setting.name, value),
+        }
+    }
+
+    fn place(&mut self, name: &str) -> Place<'_> {
+        let protocol = &mut self.protocol;
+        match name {
+            "report" => Place::Bits(&mut protocol.report_mask),
+            "report-inches" => Place::Switch(&mut protocol.report_inches),
+            "report-joints" => Place::Switch(&mut protocol.report_joints),
+            "soft-limit-alarm" => Place::Switch(&mut protocol.soft_limit_alarm),
+            "hard-limits" => Place::Switch(&mut protocol.hard_limits),
+            "homing" => Place::Switch(&mut protocol.homing),
+            "encoders" => Place::Switch(&mut protocol.encoders),
+            "error-safe" => Place::Switch(&mut protocol.error_safe),
+            "link-timeout" => Place::Number(&mut protocol.link_timeout_s),
+            _ => Place::Robot,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Robot;
+    use std::format;
+
+    #[test]
+    fn numbers_ascend_and_names_differ() {
+        assert!(SETTINGS.is_sorted_by(|a, b| a.number < b.number));
+        for (i, setting) in SETTINGS.iter().enumerate() {
+            assert!(usize::from(setting.group) < GROUPS.len());
+            let others = SETTINGS.iter().skip(i + 1);
+            assert!(others.into_iter().all(|other| other.name != setting.name));
+        }
+    }
+
+    #[test]
+    fn every_setting_of_the_robot_has_its_row() {
+        for name in RobotConfig::GROUPS.into_iter().flatten() {
+            assert!(Setting::find(name).is_some(), "{name}");
+        }
+    }
+
+    #[test]
+    fn every_setting_reads_back_by_number_and_by_name() {
+        for setting in &SETTINGS {
+            let settings = Settings::default();
+            let value = settings.value(setting);
+            assert!(value.is_finite(), "{}", setting.name);
+            for key in [format!("{}", setting.number), setting.name.into()] {
+                let mut copy = settings;
+                copy.set_all(&format!("{key}={value}")).unwrap();
+                assert_eq!(copy, settings, "{key}");
+            }
+            let other = match setting.kind {
+                Kind::Switch | Kind::Bits(_) | Kind::Choice(_) => f32::from(u8::from(value == 0.0)),
+                Kind::Decimal { low, high } => low + (high - low) / 4.0,
+            };
+            let mut copy = settings;
+            copy.set_all(&format!("{}={other}", setting.name)).unwrap();
+            assert_eq!(copy.value(setting), other, "{}", setting.name);
+            assert_ne!(copy, settings, "{}", setting.name);
+        }
+    }
+
+    #[test]
+    fn what_is_kept_comes_back() {
+        let mut settings = Settings::default();
+        settings
+            .set_all("1001=1 prefilter=zv link1=123.25 10=0 elbow=left")
+            .unwrap();
+        let mut buffer = [0; SETTINGS_BYTES];
+        let bytes = settings.to_bytes(&mut buffer);
+        assert_eq!(Settings::from_bytes(bytes), settings);
+        // an older list, and one with what does not exist
+        assert_eq!(Settings::from_bytes(&[]), Settings::default());
+        let unknown = [0xFF, 0xFF, 0, 0, 0, 0, 22, 0, 0, 0, 0, 0x42, 1, 2];
+        assert_eq!(Settings::from_bytes(&unknown), Settings::default());
+    }
+
+    #[test]
+    fn what_the_table_refuses_changes_nothing() {
+        let mut settings = Settings::default();
+        for (text, error) in [
+            ("9999=1", SettingError::Unknown),
+            ("speed=1", SettingError::Unknown),
+            ("report", SettingError::Value),
+            ("report=4", SettingError::Value),
+            ("homing=2", SettingError::Value),
+            ("homing=0.5", SettingError::Value),
+            ("elbow=up", SettingError::Value),
+            ("prefilter=-1", SettingError::Value),
+            ("tolerance=NaN", SettingError::Value),
+            ("tolerance=1 rapid=x", SettingError::Value),
+        ] {
+            assert_eq!(settings.set_all(text), Err(error), "{text}");
+        }
+        assert_eq!(settings, Settings::default());
+    }
+
+    #[test]
+    fn plain_ranges_are_those_of_the_robot() {
+        for setting in &SETTINGS {
+            let Kind::Decimal { low, high } = setting.kind else {
+                continue;
+            };
+            // What must fit something else has its range for the help only.
+            let is_plain = ["tolerance", "rapid", "feed-limit", "yaw-limit", "damping"];
+            if !is_plain.contains(&setting.name) {
+                continue;
+            }
+            for (value, is_robot) in [(low, true), (high, true), (high * 1.01, false)] {
+                let mut config = RobotConfig::default();
+                config.set_value(setting.name, value);
+                assert_eq!(Robot::new(&config).is_ok(), is_robot, "{} {value}", setting.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_setting_describes_itself() {
+        let text = |name| format!("{}", Setting::find(name).unwrap());
+        assert_eq!(text("elbow"), "[SETTING:1012|3|Elbow side||3|left,right|||0|0]");
+        assert_eq!(text("22"), "[SETTING:22|1|Locked until homed||0||||0|0]");
+        assert_eq!(
+            text("tolerance"),
+            "[SETTING:11|4|Corner tolerance|mm|6|###0.000|0|100|0|0]"
+        );
+    }
+}
