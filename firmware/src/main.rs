@@ -4,15 +4,17 @@
 
 use embassy_executor::Executor;
 use firmware::board::{
-    self, Board, BoardOutputs, BoardWatchdog, CommandIn, CommandOut, Counter, SetpointOut,
+    self, Board, BoardOutputs, BoardWatchdog, CommandIn, CommandOut, Counter, SetpointOut, StackUse,
+    Stopwatch, stack_use,
 };
-use firmware::tasks::command::{Commands, Received};
+use firmware::tasks::command::Commands;
 use firmware::tasks::control::Frames;
 use firmware::tasks::link::Link;
 use firmware::tasks::{command, control, setpoints};
-use planner_core::config::{Robot, RobotConfig};
+use planner_core::config::Robot;
 use planner_core::motion::{DelayLines, Motion};
 use planner_core::planner::Planner;
+use planner_core::protocol::{Controller, Identity, Settings};
 use planner_core::raw::SegmentQueue;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -34,8 +36,7 @@ fn start() -> Commands<CommandIn, CommandOut> {
     static FRAMES: StaticCell<Frames> = StaticCell::new();
     static SEGMENTS: ConstStaticCell<SegmentQueue> = ConstStaticCell::new(SegmentQueue::new());
     static FILTERS: ConstStaticCell<DelayLines> = ConstStaticCell::new(DelayLines::new());
-    static RECEIVED: ConstStaticCell<Received> = ConstStaticCell::new(Received::new());
-    static PLANNER: StaticCell<Planner<'static>> = StaticCell::new();
+    static CONTROLLER: StaticCell<Controller<'static>> = StaticCell::new();
     static ROBOT: StaticCell<Robot> = StaticCell::new();
 
     let Board {
@@ -48,15 +49,26 @@ fn start() -> Commands<CommandIn, CommandOut> {
         control,
         setpoints,
     } = board::start();
-    let config = RobotConfig::default();
-    let robot = ROBOT
-        .init_with(|| defmt::expect!(Robot::new(&config).ok(), "the default settings are a robot"));
+    let settings = Settings::default();
+    let robot = ROBOT.init_with(|| {
+        let robot = Robot::new(&settings.robot);
+        defmt::expect!(robot.ok(), "the default settings are a robot")
+    });
     let link: &Link = LINK.init(Link::default());
     let frames: &Frames = FRAMES.init(Frames::new());
     let (to_motion, from_planner) = SEGMENTS.take().split();
-    let blocks = to_motion.capacity();
+    let identity = Identity {
+        board: board::NAME,
+        cost_unit: Counter::UNIT,
+        blocks: to_motion.capacity(),
+        stack_use: || {
+            let StackUse { used, free } = stack_use();
+            (used, free)
+        },
+    };
     let motion = Motion::new(robot, from_planner, FILTERS.take());
-    let planner = PLANNER.init_with(|| Planner::new(robot, to_motion));
+    let controller = CONTROLLER
+        .init_with(|| Controller::new(Planner::new(robot, to_motion), settings, identity));
 
     control.spawn(defmt::unwrap!(control_task(
         motion, link, frames, outputs, stopwatch, watchdog
@@ -65,12 +77,9 @@ fn start() -> Commands<CommandIn, CommandOut> {
     Commands {
         input: command_in,
         output: command_out,
-        received: RECEIVED.take(),
-        planner,
-        config,
+        controller,
         robot,
         link,
-        blocks,
     }
 }
 
@@ -93,7 +102,7 @@ async fn setpoint_task(frames: &'static Frames, port: SetpointOut) {
 
 #[embassy_executor::task]
 async fn command_task(commands: Commands<CommandIn, CommandOut>) {
-    command::run::<Counter>(commands).await
+    command::run(commands).await
 }
 
 #[embassy_executor::task]

@@ -172,19 +172,9 @@ impl SerialLoop<'_> {
         self.now_ms += 1;
         let before = self.report.setpoint.pose;
         let setpoint = self.motion.tick();
-        let step_mm = |to: planner_core::units::LengthMm, from| {
-            f64::from(to.saturating_sub(from).to_num::<f32>())
-        };
-        let pose = setpoint.pose;
-        let steps = [
-            step_mm(pose.x, before.x),
-            step_mm(pose.y, before.y),
-            step_mm(pose.z, before.z),
-        ];
-        let squared: f64 = steps.iter().map(|step| step * step).sum();
         self.report = Report {
             setpoint,
-            speed_mm_s: (squared.sqrt() * 1000.0) as f32,
+            previous_pose: before,
             orders: self.report.orders,
             inputs: self.inputs,
             encoders: self.encoders,

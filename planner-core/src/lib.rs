@@ -16,6 +16,7 @@ pub mod planner;
 pub mod pose;
 pub mod prefilter;
 mod rate;
+pub mod protocol;
 pub mod raw;
 mod schedule;
 pub mod telemetry;

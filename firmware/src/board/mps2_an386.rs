@@ -35,6 +35,9 @@ const SYSTICK_HZ: u32 = 1000;
 /// Counts of embassy-time from one SysTick to the next.
 const TIME_PER_SYSTICK: u64 = embassy_time::TICK_HZ / SYSTICK_HZ as u64;
 
+/// What `$I+` calls it.
+pub const NAME: &str = "mps2-an386";
+
 /// The emulated board's parts.
 pub type Parts = Board<CommandIn, CommandOut, SetpointOut, BoardOutputs, BoardWatchdog, Counter>;
 

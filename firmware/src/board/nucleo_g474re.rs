@@ -25,6 +25,9 @@ use static_cell::ConstStaticCell;
 
 use super::{Board, ByteIn, ByteOut, Outputs, Stopwatch, WATCHDOG_MS, Watchdog};
 
+/// What `$I+` calls it.
+pub const NAME: &str = "nucleo-g474re";
+
 /// The real board's parts.
 pub type Parts = Board<CommandIn, CommandOut, SetpointOut, BoardOutputs, BoardWatchdog, Counter>;
 

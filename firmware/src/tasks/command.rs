@@ -42,8 +42,7 @@ pub async fn run(commands: Commands<impl ByteIn, impl ByteOut>) -> ! {
             Step::Order(order) => link.order(order).await,
             Step::Robot => {
                 robot.clone_from(controller.robot());
-                link.send_robot(robot).await;
-                robot = link.robot_back().await;
+                robot = link.exchange_robot(robot).await;
             }
             Step::Wait(until_ms) => {
                 wake = until_ms.map_or(Instant::MAX, |ms| Instant::MIN + Duration::from_millis(ms));

@@ -16,11 +16,12 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_time::{Duration, Instant, TICK_HZ, Timer};
 use planner_core::motion::Motion;
+use planner_core::protocol::Report;
 use planner_core::telemetry::SetpointFrame;
 use planner_core::units;
 
 use crate::board::{Outputs, Stopwatch, Watchdog};
-use crate::tasks::link::{Link, Order, Report};
+use crate::tasks::link::{Link, Order};
 
 /// Frames between the control task and the setpoint task. The latter runs in the
 /// next lower interrupt executor, so a second frame waits only while the port does.
@@ -52,9 +53,11 @@ pub async fn run(
     loop {
         Timer::at(due).await;
         while let Some(order) = link.next_order() {
-            report.orders = report.orders.wrapping_add(1);
             match order {
-                Order::Motion(order) => motion.obey(order),
+                Order::Motion(order) => {
+                    motion.obey(order);
+                    report.orders = report.orders.wrapping_add(1);
+                }
                 Order::Robot(robot) => {
                     motion.set_robot(robot);
                     link.return_robot(robot);
@@ -75,23 +78,22 @@ pub async fn run(
         // settles go on, but later than they should.
         let is_starved = motion.is_out_of_path() && link.program_is_open();
         if is_starved && !was_starved {
-            report.starved = report.starved.saturating_add(1);
+            report.health.starved = report.health.starved.saturating_add(1);
         }
         was_starved = is_starved;
-        report.worst_tick = report.worst_tick.max(tick_cost);
+        report.health.worst_tick = report.health.worst_tick.max(tick_cost);
         report.previous_pose = last.pose;
         report.setpoint = setpoint;
-        report.queue_is_empty = motion.is_empty();
         let frame = SetpointFrame {
-            sequence: report.ticks,
+            sequence: report.health.ticks,
             setpoint,
             tick_cost,
-            overruns: report.overruns,
+            overruns: report.health.overruns,
         };
         if frames.try_send(frame).is_err() {
-            report.unsent = report.unsent.saturating_add(1);
+            report.health.unsent = report.health.unsent.saturating_add(1);
         }
-        report.ticks = report.ticks.wrapping_add(1);
+        report.health.ticks = report.health.ticks.wrapping_add(1);
 
         let now = Instant::now();
         due += PERIOD;
@@ -100,7 +102,7 @@ pub async fn run(
         } else {
             while due <= now {
                 due += PERIOD;
-                report.overruns = report.overruns.saturating_add(1);
+                report.health.overruns = report.health.overruns.saturating_add(1);
             }
         }
         link.publish(report);

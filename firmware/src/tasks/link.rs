@@ -7,8 +7,8 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use planner_core::config::Robot;
-use planner_core::motion::{self, Setpoint};
-use planner_core::pose::Pose;
+use planner_core::motion;
+use planner_core::protocol::Report;
 
 /// What the command task asks of the control task. Obeyed in order, before the next tick.
 pub enum Order {
@@ -17,29 +17,6 @@ pub enum Order {
     /// Other settings, in the one place they have; it goes back with
     /// [`Link::return_robot`]. At rest only.
     Robot(&'static mut Robot),
-}
-
-/// What the control task tells about its last tick.
-#[derive(Clone, Copy, Default)]
-pub struct Report {
-    /// What left in the tick.
-    pub setpoint: Setpoint,
-    /// Where the tool was a tick before, for the speed.
-    pub previous_pose: Pose,
-    /// Ticks since the start.
-    pub ticks: u32,
-    /// Control periods missed since the start.
-    pub overruns: u32,
-    /// The dearest tick, in the board's unit.
-    pub worst_tick: u32,
-    /// Frames that found no room on their way out.
-    pub unsent: u32,
-    /// Times the moves ran out before the program ended.
-    pub starved: u32,
-    /// Orders obeyed since the start.
-    pub orders: u32,
-    /// Whether no move is queued or under way.
-    pub queue_is_empty: bool,
 }
 
 /// Orders under way: a place and a start may follow each other within a period.
@@ -69,12 +46,14 @@ impl Default for Link {
 
 impl Link {
     /// Command task: asks for something.
-    pub async fn order(&self, order: Order) {
-        self.orders.send(order).await;
+    pub async fn order(&self, order: motion::Order) {
+        self.orders.send(Order::Motion(order)).await;
     }
 
-    /// Command task: waits for the robot that [`Order::Robot`] took along.
-    pub async fn robot_back(&self) -> &'static mut Robot {
+    /// Command task: other settings, in the one place they have; comes back when they are in
+    /// force.
+    pub async fn exchange_robot(&self, robot: &'static mut Robot) -> &'static mut Robot {
+        self.orders.send(Order::Robot(robot)).await;
         self.robots.receive().await
     }
 

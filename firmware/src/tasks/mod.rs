@@ -2,8 +2,5 @@
 
 pub mod command;
 pub mod control;
-mod cycle_start;
-mod inbox;
 pub mod link;
 pub mod setpoints;
-mod text;

@@ -678,7 +678,7 @@ impl Controller<'_> {
                 inches: protocol.report_inches,
                 buffers: has_buffers.then(|| (self.planner.free_places(), self.inbox.free_bytes())),
                 line: self.has_line_numbers.then_some(report.setpoint.line),
-                speed_mm_s: report.speed_mm_s,
+                speed_mm_s: report.speed_mm_s(),
                 inputs: report.inputs,
                 outputs: report.setpoint.outputs,
                 rates: self.rates,
