@@ -21,6 +21,7 @@ pub mod progress;
 pub mod random_program;
 pub mod robot_file;
 pub mod scenario;
+pub mod serial_loop;
 pub mod software_loop;
 pub mod summary;
 mod toml_place;

@@ -131,7 +131,7 @@ impl SerialLoop<'_> {
     }
 
     /// Number of the last line with a checksum that was accepted.
-    pub fn last_line(&self) -> u32 {
+    pub fn last_line(&self) -> i32 {
         self.controller.last_line()
     }
 
@@ -148,7 +148,7 @@ impl SerialLoop<'_> {
             ..Pose::default()
         };
         let scara = &self.controller.robot().scara;
-        scara.inverse(&pose).expect("the point is within reach")
+        scara.inverse(&pose)
     }
 
     /// The setpoint of the last tick.

@@ -62,6 +62,8 @@ pub struct Setpoint {
     pub state: MotionState,
     /// The digital outputs: bit 0 the gripper, bit 1 the blow-off.
     pub outputs: u8,
+    /// Line number of the move under way.
+    pub line: u32,
 }
 
 /// The delay lines of the filters: most of the core's memory, 25 KiB, apart from [`Motion`] so
@@ -238,6 +240,7 @@ impl<'q> Motion<'q> {
             joints: self.kinematics.joint_state(&pose, velocity, acceleration),
             state: self.state(),
             outputs: self.outputs,
+            line: 0,
         }
     }
 

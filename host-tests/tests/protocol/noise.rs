@@ -251,7 +251,7 @@ fn protected(lines: u32, seed: u64) -> Outcome {
             }
             let mut count = |desk: &SerialLoop<'_>| {
                 watch.look(desk);
-                let line = desk.last_line();
+                let line = u32::try_from(desk.last_line()).unwrap_or(0);
                 if desk.banners() != banners {
                     // A byte has become a reset: what it took is reported, and the sender
                     // goes on from the last line that it knows of.

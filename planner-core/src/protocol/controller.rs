@@ -3,7 +3,7 @@
 use heapless::Deque;
 
 use crate::config::{ConfigError, Robot, SettingError};
-use crate::gcode::{Line, LineBuffer, Received};
+use crate::gcode::{Line, LineBuffer, Offsets, Received};
 use crate::motion::{MotionState, Order};
 use crate::planner::{LineError, Planner};
 use crate::pose::Pose;
@@ -64,7 +64,7 @@ enum Out {
     RobotRefused(ConfigError),
     SettingRefused(SettingError),
     Startup { line: u8, code: u8 },
-    NextIs(u32),
+    NextIs(i32),
 }
 
 /// What the controller is in, apart from motion and hold.
@@ -156,7 +156,7 @@ pub struct Controller<'q> {
     /// After an error, in error-safe streaming: until `$ACK`.
     is_refusing: bool,
     /// Number of the last line that came whole, once lines carry checksums.
-    sequence: Option<u32>,
+    sequence: Option<i32>,
     /// The next start-up line to execute.
     startup: Option<u8>,
     startup_lines: [KeptText; 2],
@@ -165,7 +165,7 @@ pub struct Controller<'q> {
 }
 
 /// What `$I` says of the firmware it runs in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Identity {
     /// Name of the board.
     pub board: &'static str,
@@ -211,12 +211,12 @@ impl<'q> Controller<'q> {
     /// Where the last accepted move ends, if the position is known.
     #[must_use]
     pub fn target(&self) -> Option<Pose> {
-        self.planner.position()
+        self.planner.interpreter().modal().position()
     }
 
     /// Number of the last line with a checksum that was accepted, 0 if there is none.
     #[must_use]
-    pub fn last_line(&self) -> u32 {
+    pub fn last_line(&self) -> i32 {
         self.sequence.unwrap_or(0)
     }
 
@@ -778,7 +778,7 @@ impl Controller<'_> {
         if self.mode == Mode::Checking {
             return self.planner.check(line);
         }
-        let accepted = self.planner.line(line)?;
+        let accepted = self.planner.execute(line)?;
         if let Some(pose) = accepted.reference {
             self.out(Out::Order(Order::Place(pose)));
         }
@@ -816,7 +816,7 @@ impl Controller<'_> {
                 self.sequence = Some(number);
                 Ok(true)
             }
-            (Some(last), Some(number)) if number == last + 1 => {
+            (Some(last), Some(number)) if number == last.wrapping_add(1) => {
                 self.sequence = Some(number);
                 Ok(true)
             }
@@ -828,7 +828,7 @@ impl Controller<'_> {
     /// Says from where to send again.
     fn say_next_number(&mut self) {
         if let Some(last) = self.sequence {
-            self.out(Out::NextIs(last + 1));
+            self.out(Out::NextIs(last.wrapping_add(1)));
         }
     }
 
@@ -980,7 +980,7 @@ impl Controller<'_> {
     fn adopt(&mut self, settings: &Settings) -> bool {
         if settings.robot != self.settings.robot {
             match Robot::new(&settings.robot) {
-                Ok(robot) => self.planner.set_robot(robot),
+                Ok(robot) => self.planner.set_robot(&robot),
                 Err(error) => {
                     self.out(Out::RobotRefused(error));
                     self.out(Out::Error(Refusal::BadDollar.code()));
@@ -1000,7 +1000,7 @@ impl Controller<'_> {
         }
         let checked = Line::parse(text.as_bytes())
             .map_err(|error| self.planner.refused(error))
-            .and_then(|line| self.planner.check_syntax(&line));
+            .and_then(|line| self.planner.would_accept(&line));
         match checked {
             Ok(()) => self.keep_text(Record::StartupLine(line), text),
             Err(error) => {
@@ -1036,7 +1036,7 @@ impl Controller<'_> {
             self.out(Out::Keep(Record::Settings));
         }
         if matches!(restore, Restore::Offsets | Restore::All) {
-            self.planner.forget_offsets();
+            self.planner.set_offsets(Offsets::NONE);
             self.cadence.offset_changed();
             self.out(Out::Keep(Record::Offsets));
         }
@@ -1071,7 +1071,11 @@ impl Controller<'_> {
                 let settings = Settings::from_bytes(bytes);
                 self.adopt(&settings);
             }
-            Record::Offsets => self.planner.restore_offsets(bytes),
+            Record::Offsets => {
+                if let Some(offsets) = Offsets::from_bytes(bytes) {
+                    self.planner.set_offsets(offsets);
+                }
+            }
             Record::StartupLine(_) | Record::BuildName => {
                 if let Ok(text) = core::str::from_utf8(bytes)
                     && let Ok(text) = KeptText::try_from(text)
@@ -1085,13 +1089,13 @@ impl Controller<'_> {
     /// What to keep of a record, written into `buffer`.
     pub fn record<'b>(&self, record: Record, buffer: &'b mut [u8; RECORD_BYTES]) -> &'b [u8] {
         match record {
-            Record::Settings => {
-                let (bytes, _) = buffer.split_first_chunk_mut().expect("checked below");
-                self.settings.to_bytes(bytes)
+            Record::Settings => copied(buffer, &self.settings.to_bytes()),
+            Record::Offsets => copied(buffer, &self.planner.interpreter().offsets().to_bytes()),
+            Record::StartupLine(line) => {
+                let text = self.startup_lines.get(usize::from(line));
+                copied(buffer, text.map_or(&[], |text| text.as_bytes()))
             }
-            Record::Offsets => self.planner.interpreter().offsets().to_bytes(buffer),
-            Record::StartupLine(line) => copied(buffer, self.startup_lines.get(usize::from(line))),
-            Record::BuildName => copied(buffer, Some(&self.build_name)),
+            Record::BuildName => copied(buffer, self.build_name.as_bytes()),
         }
     }
 
@@ -1108,10 +1112,8 @@ impl Controller<'_> {
     }
 }
 
-fn copied<'b>(buffer: &'b mut [u8], text: Option<&KeptText>) -> &'b [u8] {
-    let bytes = text.map_or(&[][..], |text| text.as_bytes());
-    let length = bytes.len().min(buffer.len());
-    let (place, _) = buffer.split_at_mut(length);
-    place.copy_from_slice(&bytes[..length]);
+fn copied<'b>(buffer: &'b mut [u8; RECORD_BYTES], bytes: &[u8]) -> &'b [u8] {
+    let (place, _) = buffer.split_at_mut(bytes.len().min(RECORD_BYTES));
+    place.copy_from_slice(bytes);
     place
 }

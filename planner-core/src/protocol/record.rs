@@ -1,6 +1,6 @@
 //! What is kept over a restart.
 
-use crate::gcode::OFFSETS_BYTES;
+use crate::gcode::Offsets;
 
 use super::settings::SETTINGS_BYTES;
 
@@ -26,7 +26,7 @@ pub type KeptText = heapless::String<TEXT_BYTES>;
 /// The longest record in bytes.
 pub const RECORD_BYTES: usize = 320;
 
-const _: () = assert!(SETTINGS_BYTES <= RECORD_BYTES && OFFSETS_BYTES <= RECORD_BYTES);
+const _: () = assert!(SETTINGS_BYTES <= RECORD_BYTES && Offsets::BYTES <= RECORD_BYTES);
 
 impl Record {
     /// Every record there is.

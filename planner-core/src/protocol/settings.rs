@@ -292,7 +292,9 @@ impl Settings {
     }
 
     /// As kept over a restart: number and value of each setting, little-endian.
-    pub fn to_bytes<'b>(&self, buffer: &'b mut [u8; SETTINGS_BYTES]) -> &'b [u8] {
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; SETTINGS_BYTES] {
+        let mut buffer = [0; SETTINGS_BYTES];
         for (setting, place) in SETTINGS.iter().zip(buffer.chunks_exact_mut(PAIR_BYTES)) {
             let (number, value) = place.split_at_mut(2);
             number.copy_from_slice(&setting.number.to_le_bytes());
@@ -398,9 +400,7 @@ mod tests {
         settings
             .set_all("1001=1 prefilter=zv link1=123.25 10=0 elbow=left")
             .unwrap();
-        let mut buffer = [0; SETTINGS_BYTES];
-        let bytes = settings.to_bytes(&mut buffer);
-        assert_eq!(Settings::from_bytes(bytes), settings);
+        assert_eq!(Settings::from_bytes(&settings.to_bytes()), settings);
         // an older list, and one with what does not exist
         assert_eq!(Settings::from_bytes(&[]), Settings::default());
         let unknown = [0xFF, 0xFF, 0, 0, 0, 0, 22, 0, 0, 0, 0, 0x42, 1, 2];
