@@ -4,7 +4,7 @@ use std::fmt;
 
 use planner_core::config::Robot;
 use planner_core::motion::{DelayLines, Motion, MotionState, Setpoint};
-use planner_core::planner::{Accepted, LineError, Planner};
+use planner_core::planner::{LineError, Planner};
 use planner_core::raw::SegmentQueue;
 
 /// Why a program does not run; nothing has moved.
@@ -45,10 +45,10 @@ pub fn check(robot: &Robot, program: &str) -> Result<(), ProgramError> {
     let mut planner = Planner::new(robot, producer);
     let mut moves = false;
     for line in program.lines() {
-        match planner.line(line.as_bytes())? {
-            Accepted::End => break,
-            Accepted::Queued => moves = true,
-            Accepted::Nothing | Accepted::Reference(_) => {}
+        let accepted = planner.line(line.as_bytes())?;
+        moves |= accepted.queued;
+        if accepted.ended {
+            break;
         }
         while consumer.dequeue().is_some() {}
     }
@@ -110,12 +110,15 @@ impl<'q> Controller<'q> {
         let mut more = true;
         loop {
             while more && self.planner.has_room() {
-                match lines.next().map(|line| self.planner.line(line.as_bytes())) {
-                    Some(Ok(Accepted::Reference(pose))) => self.motion.place(pose),
-                    Some(Ok(Accepted::End)) | None => more = false,
-                    Some(Ok(Accepted::Nothing | Accepted::Queued)) => {}
-                    Some(Err(error)) => return Err(error),
+                let Some(line) = lines.next() else {
+                    more = false;
+                    break;
+                };
+                let accepted = self.planner.line(line.as_bytes())?;
+                if let Some(pose) = accepted.reference {
+                    self.motion.place(pose);
                 }
+                more = !accepted.ended;
             }
             self.motion.start();
             let setpoint = self.motion.tick();

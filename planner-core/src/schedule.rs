@@ -67,6 +67,11 @@ impl<'q> Schedule<'q> {
         self.segments.ready()
     }
 
+    /// Segments that the look-ahead has room for.
+    pub fn free_places(&self) -> usize {
+        self.segments.capacity() - self.segments.len()
+    }
+
     /// Forgets what came before: the next segment begins from rest.
     pub fn reset(&mut self) {
         self.previous = None;

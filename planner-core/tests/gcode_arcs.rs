@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use planner_core::gcode::{
-    Command, Defaults, Error, Interpreter, Line, LineBuffer, Move, Received,
+    Command, Defaults, Error, Interpreter, Line, LineBuffer, Move, Offsets, Received,
 };
 use planner_core::path::{Arc, Shape};
 use planner_core::pose::Pose;
@@ -14,18 +14,19 @@ const ROUNDING_MM: f64 = 1.4e-6;
 
 fn run(interpreter: &mut Interpreter, text: &str) -> Result<Command, Error> {
     let line = Line::parse(text.as_bytes())?;
-    let (modal, command) = interpreter.interpret(&line)?;
-    interpreter.commit(modal);
-    Ok(command)
+    let interpreted = interpreter.interpret(&line)?;
+    interpreter.commit(&interpreted);
+    Ok(interpreted.command)
 }
 
 fn arc_move(lines: &[&str]) -> (Move, Arc) {
     let mut interpreter = Interpreter::new(Defaults::default());
-    let mut command = Ok(Command::Nothing);
+    let mut command = Ok(Command::default());
     for line in lines {
         command = run(&mut interpreter, line);
     }
-    if let Ok(Command::Move(motion)) = command
+    if let Ok(command) = &command
+        && let [motion] = *command.moves
         && let Shape::Arc(arc) = motion.path.shape
     {
         return (motion, arc);
@@ -236,7 +237,7 @@ proptest! {
     #[test]
     fn programs_hang_together(
         lines in prop::collection::vec(
-            "[GMGXYZCFIJRPN]([0-4]|-?[0-9]{1,4}(\\.[0-9]{0,4})?)\
+            "([GMGXYZCFIJRPNQL]([0-4]|-?[0-9]{1,4}(\\.[0-9]{0,4})?)|G10 L20? P[0-6]|G(28|30|92)(\\.1)?|G53|G5[4-9]|G43\\.1)\
              ( [GMGXYZCFIJRPST]([0-4]|-?[0-9]{1,3}(\\.[0-9]{0,4})?)){0,5}",
             0..60,
         ),
@@ -245,19 +246,25 @@ proptest! {
         run(&mut interpreter, "G0 X10 Y10 F100").unwrap();
         for text in &lines {
             let before = *interpreter.modal();
+            let offsets = interpreter.offsets().clone();
             let position = before.position().unwrap();
             match run(&mut interpreter, text) {
-                Ok(Command::Move(motion)) => {
-                    prop_assert_eq!(motion.path.start, position);
-                    prop_assert_eq!(Some(motion.path.target), interpreter.modal().position());
-                    match motion.path.shape {
-                        Shape::Line => prop_assert_ne!(motion.path.start, motion.path.target),
-                        Shape::Arc(arc) => assert_ends_meet(&motion, &arc),
+                Ok(command) => {
+                    let mut end = position;
+                    for motion in &command.moves {
+                        prop_assert_eq!(motion.path.start, end);
+                        end = motion.path.target;
+                        match motion.path.shape {
+                            Shape::Line => prop_assert_ne!(motion.path.start, end),
+                            Shape::Arc(arc) => assert_ends_meet(motion, &arc),
+                        }
                     }
+                    prop_assert_eq!(Some(end), interpreter.modal().position());
+                    prop_assert_eq!(interpreter.offsets().to_bytes(), Offsets::from_bytes(&interpreter.offsets().to_bytes()).unwrap().to_bytes());
                 }
-                Ok(_) => prop_assert_eq!(Some(position), interpreter.modal().position()),
                 Err(error) => {
                     prop_assert_eq!(before, *interpreter.modal());
+                    prop_assert_eq!(&offsets, interpreter.offsets());
                     prop_assert!(error.to_string().len() > 10);
                 }
             }
@@ -271,9 +278,9 @@ proptest! {
         for byte in bytes {
             if buffer.push(byte) == Received::Line
                 && let Ok(line) = Line::parse(buffer.line())
-                && let Ok((modal, _)) = interpreter.interpret(&line)
+                && let Ok(interpreted) = interpreter.interpret(&line)
             {
-                interpreter.commit(modal);
+                interpreter.commit(&interpreted);
             }
         }
     }

@@ -1,22 +1,31 @@
 //! G-code from text to commands: what every line does, and what every wrong line is called.
 
 use planner_core::gcode::{
-    Command, Defaults, Distance, Error, Feed, Interpreter, Line, Motion, Move, Units,
+    Command, Defaults, Distance, Error, Feed, Interpreter, Line, Motion, Move, ProgramFlow, Units,
 };
+use planner_core::kinematics::Elbow;
 use planner_core::path::{PathSegment, Shape};
 use planner_core::pose::Pose;
+use planner_core::prefilter::{Kind, PrefilterConfig};
 use planner_core::units::LengthMm;
 
 const DEFAULTS: Defaults = Defaults {
     corner_tolerance_mm: 0.25,
+    prefilter: PrefilterConfig {
+        kind: Kind::FirZvd,
+        frequency_hz: 6.34,
+        damping: 0.022,
+    },
+    elbow: Elbow::Right,
+    first_point_declares: true,
 };
 
 /// Executes one line and commits it.
 fn run(interpreter: &mut Interpreter, text: &str) -> Result<Command, Error> {
     let line = Line::parse(text.as_bytes())?;
-    let (modal, command) = interpreter.interpret(&line)?;
-    interpreter.commit(modal);
-    Ok(command)
+    let interpreted = interpreter.interpret(&line)?;
+    interpreter.commit(&interpreted);
+    Ok(interpreted.command)
 }
 
 /// An interpreter after a program of good lines.
@@ -29,9 +38,10 @@ fn after(lines: &[&str]) -> Interpreter {
 }
 
 fn run_move(interpreter: &mut Interpreter, text: &str) -> Move {
-    match run(interpreter, text) {
-        Ok(Command::Move(motion)) => motion,
-        other => panic!("{text}: {other:?}"),
+    let command = run(interpreter, text);
+    match command.as_ref().map(|command| &*command.moves) {
+        Ok([motion]) => *motion,
+        _ => panic!("{text}: {command:?}"),
     }
 }
 
@@ -46,6 +56,7 @@ fn every_wrong_line_has_its_code() {
     const LINEAR: &[&str] = &["G0 X10 Y0", "G1 F600"];
     const ARC: &[&str] = &["G0 X10 Y0", "F600"];
     const G80: &[&str] = &["G0 X10 Y0", "G80"];
+    const INVERSE_TIME: &[&str] = &["G0 X10 Y0", "G93 G1 X1 F60"];
     for (before, text, code) in [
         (RAPID, "10", 1),
         (RAPID, "X", 2),
@@ -57,23 +68,25 @@ fn every_wrong_line_has_its_code() {
         (RAPID, "T-1", 4),
         (RAPID, "G64 P-0.1", 4),
         (RAPID, "G5", 20),
-        (RAPID, "G10 L2 P1 X0", 20),
-        (RAPID, "G18", 20),
-        (RAPID, "G19", 20),
-        (RAPID, "G28", 20),
         (RAPID, "G38.2 Z-1 F10", 20),
         (RAPID, "G41", 20),
-        (RAPID, "G43.1 Z1", 20),
-        (RAPID, "G53 G0 X1", 20),
+        (RAPID, "G43 Z1", 20),
+        (RAPID, "G43.2 Z1", 20),
+        (RAPID, "G28.2", 20),
+        (RAPID, "G30.2", 20),
         (RAPID, "G61.1", 20),
         (RAPID, "G90.1", 20),
         (RAPID, "G91.2", 20),
-        (RAPID, "G92 X0", 20),
-        (RAPID, "G93", 20),
+        (RAPID, "G92.2", 20),
+        (RAPID, "G10 P1 X0", 20),
+        (RAPID, "G10 L3 P1 X0", 20),
+        (RAPID, "G10 L2 P1 X0 R0", 20),
+        (RAPID, "G0 X1 Q1", 20),
         (RAPID, "G256", 20),
         (RAPID, "G-1", 20),
         (RAPID, "M10", 20),
-        (RAPID, "M110", 20),
+        (RAPID, "M103", 20),
+        (RAPID, "M110 X1", 20),
         (RAPID, "G0 X1 A1", 20),
         (RAPID, "G0 X1 B1", 20),
         (RAPID, "G0 X1 U1", 20),
@@ -83,8 +96,15 @@ fn every_wrong_line_has_its_code() {
         (RAPID, "G0 G1 X1", 21),
         (RAPID, "G0 G0 X1", 21),
         (RAPID, "G0 G80", 21),
+        (RAPID, "G17 G18", 21),
         (RAPID, "G20 G21", 21),
+        (RAPID, "G43.1 G49 Z1", 21),
+        (RAPID, "G4 G53 P1", 21),
+        (RAPID, "G28 G92 X1", 21),
+        (RAPID, "G54 G55", 21),
         (RAPID, "G90 G91", 21),
+        (RAPID, "G93 G94", 21),
+        (RAPID, "M101 M102", 21),
         (RAPID, "G61 G64", 21),
         (RAPID, "M0 M30", 21),
         (RAPID, "M3 M5", 21),
@@ -93,24 +113,54 @@ fn every_wrong_line_has_its_code() {
         (RAPID, "G1", 22),
         (RAPID, "G1 X1 F0", 22),
         (RAPID, "G2 X1 R5", 22),
+        (LINEAR, "G93 G1 X1", 22),
+        (LINEAR, "G93 X1", 22),
+        (INVERSE_TIME, "X2", 22),
+        (INVERSE_TIME, "X2 F0", 22),
+        (INVERSE_TIME, "G94 X2", 22),
         (RAPID, "G1.5", 23),
         (RAPID, "G17.05", 23),
-        (RAPID, "G59.1", 23),
+        (RAPID, "G10.1", 23),
+        (RAPID, "G59.4", 23),
         (RAPID, "M3.1", 23),
+        (RAPID, "M99.1", 23),
+        (RAPID, "M100 P1.5", 23),
         (RAPID, "G49 G0 X1", 24),
         (RAPID, "G49 X1", 24),
+        (RAPID, "G43.1 Z1 G0", 24),
+        (RAPID, "G0 G10 L2 P1 X1", 24),
+        (RAPID, "G1 G28 X1", 24),
+        (RAPID, "G2 G30 X1", 24),
+        (RAPID, "G92 G0 X1", 24),
+        (RAPID, "G92 G43.1 Z1", 24),
         (RAPID, "X1 X1", 25),
         (RAPID, "F1 F1", 25),
         (ARC, "G2", 26),
         (ARC, "G2 I5", 26),
+        (RAPID, "G10 L2 P1", 26),
+        (RAPID, "G92", 26),
         (RAPID, "N10000001", 27),
         (RAPID, "G4", 28),
-        (RAPID, "G55", 29),
-        (RAPID, "G59", 29),
+        (RAPID, "G4 X1", 28),
+        (RAPID, "G10 X1", 28),
+        (RAPID, "G10 L2 P7 X1", 29),
+        (RAPID, "G10 L20 P7 X1", 29),
+        (RAPID, "G59.1", 29),
+        (RAPID, "G59.3", 29),
+        (ARC, "G53 G2 X1 R5", 30),
+        (&["G0 X10 Y0", "G2 X8 R4 F1"], "G53 X1", 30),
+        (RAPID, "G53 G80", 30),
+        (G80, "G53", 30),
         (G80, "X1", 31),
+        (G80, "G10 L2 P1 X1", 31),
+        (G80, "G28 X1", 31),
+        (G80, "G92 X1", 31),
+        (G80, "G43.1 Z1", 31),
         (G80, "G80 C1", 31),
         (ARC, "G2 Z1 I1", 32),
         (ARC, "G2 C1 I1", 32),
+        (ARC, "G18 G2 Y1 I1", 32),
+        (ARC, "G19 G2 X1 J1", 32),
         (ARC, "G2 X10 Y0 R5", 33),
         (ARC, "G2 X10 Y0 Z1 R5", 33),
         (ARC, "G2 X21 Y0 I5", 33),
@@ -130,6 +180,17 @@ fn every_wrong_line_has_its_code() {
         (LINEAR, "K1", 36),
         (LINEAR, "G61 P0.1", 36),
         (ARC, "G2 X20 R5 I5", 36),
+        (LINEAR, "G0 X1 L2", 36),
+        (LINEAR, "G92 X1 P1", 36),
+        (LINEAR, "G10 L20 P1 X0 R1", 36),
+        (LINEAR, "G28 P1", 36),
+        (LINEAR, "M100 P1 X1", 36),
+        (LINEAR, "M101 P1", 36),
+        (LINEAR, "M102 F1", 36),
+        (RAPID, "G43.1", 37),
+        (RAPID, "G43.1 X1", 37),
+        (RAPID, "G43.1 Z1 X1", 37),
+        (RAPID, "G43.1 Z1 C1", 37),
         (RAPID, "T256", 38),
         (RAPID, "X9999999999", 60),
         (RAPID, "G20 X99999999", 60),
@@ -139,24 +200,43 @@ fn every_wrong_line_has_its_code() {
         (RAPID, "C1440.1", 61),
         (RAPID, "G91 X4090", 61),
         (RAPID, "G20 X161.3", 61),
+        (&["G10 L2 P2 X10", "G0 X10 Y0"], "G55 X4090", 61),
+        (RAPID, "G10 L2 P2 X4096", 61),
+        (RAPID, "G10 L20 P2 X-4090", 61),
+        (RAPID, "G92 X-4090", 61),
+        (RAPID, "G43.1 Z4096", 61),
         (&[], "G0 X1", 62),
+        (&[], "G10 L20 P1 X0", 62),
+        (&[], "G92 X0", 62),
+        (&[], "G28", 62),
+        (&[], "G30 X1", 62),
+        (&[], "G28.1", 62),
+        (&[], "G30.1", 62),
+        (&["G10 L2 P2 X9"], "G91 G53 G0 Z1 X1", 62),
         (&[], "G0 Y1", 62),
         (&[], "G0 Z1", 62),
         (&[], "G91 G0 X1 Y1", 62),
         (&[], "G2 X1 Y1 R1 F1", 62),
         (RAPID, "G0 X1*0", 63),
-        (RAPID, "G4 P1 X1", 65),
-        (RAPID, "X1 M30", 65),
-        (RAPID, "G4 P1 M0", 65),
         (RAPID, "G4 P1 G64", 65),
+        (RAPID, "G10 L2 P1 X1 G64", 65),
+        (RAPID, "M101 G0 X1", 65),
+        (RAPID, "M100 P1 M3", 65),
+        (RAPID, "M102 M30", 65),
+        (ARC, "G18 G2 X1 I1", 75),
+        (ARC, "G19 G3 Y1 R1", 75),
+        (RAPID, "M100 P7", 76),
+        (RAPID, "M100 P1000", 76),
     ] {
         let mut interpreter = after(before);
         let modal = *interpreter.modal();
+        let offsets = interpreter.offsets().clone();
         match run(&mut interpreter, text) {
             Err(error) => assert_eq!(error.code(), code, "{text}: {error}"),
             Ok(command) => panic!("{text}: {command:?} instead of error {code}"),
         }
         assert_eq!(*interpreter.modal(), modal, "{text}");
+        assert_eq!(*interpreter.offsets(), offsets, "{text}");
     }
 }
 
@@ -168,19 +248,35 @@ fn lines_without_motion_change_the_modal_state_only() {
         "G0",
         "G17 G21 G40 G49 G54 G80 G90 G91.1 G94",
         "M1",
-        "M3 S1000",
-        "M4",
-        "M5 M9",
+        "G18",
+        "G19",
+        "G59",
+        "G93",
+        "G93 F60",
+        "G53",
+        "G53 X10",
+        "G92.1",
+        "G28.1",
+        "G10 L2 P1 X5",
+        "G43.1 Z5",
+        "G92 X0 Y0",
+        "M5 M9 S1000",
         "M6 T1",
-        "M7",
-        "M8",
+        "M102",
+        "M100",
+        "M110 N7",
+        "N-1 M110 N-1*125",
         "T255",
         "G1 F100",
         "X10 Y0",
         "G1 F100 X10",
     ] {
         let mut interpreter = after(&["G0 X10 Y0"]);
-        assert_eq!(run(&mut interpreter, text), Ok(Command::Nothing), "{text}");
+        assert_eq!(
+            run(&mut interpreter, text),
+            Ok(Command::default()),
+            "{text}"
+        );
         let position = interpreter.modal().position();
         assert_eq!(position, Some(pose(10.0, 0.0, 0.0, 0.0)));
     }
@@ -208,8 +304,11 @@ fn the_first_point_is_the_reference() {
         ),
     ] {
         let mut interpreter = after(&[]);
-        let command = run(&mut interpreter, text);
-        assert_eq!(command, Ok(Command::Reference(expected)), "{text}");
+        let command = Command {
+            reference: Some(expected),
+            ..Command::default()
+        };
+        assert_eq!(run(&mut interpreter, text), Ok(command), "{text}");
         assert_eq!(interpreter.modal().position(), Some(expected), "{text}");
     }
     // A robot that has been homed knows better.
@@ -224,8 +323,8 @@ fn the_first_point_is_the_reference() {
 fn moves_carry_what_the_planner_needs() {
     let mut interpreter = after(&["G0 X10 Y0"]);
     assert_eq!(
-        run(&mut interpreter, "g1 x20 y-5 z1.5 c45 f9600 (go)"),
-        Ok(Command::Move(Move {
+        run_move(&mut interpreter, "g1 x20 y-5 z1.5 c45 f9600 (go)"),
+        Move {
             path: PathSegment {
                 start: pose(10.0, 0.0, 0.0, 0.0),
                 target: pose(20.0, -5.0, 1.5, 45.0),
@@ -234,7 +333,7 @@ fn moves_carry_what_the_planner_needs() {
             feed: Feed::MmPerS(160.0),
             corner_tolerance_mm: 0.25,
             line: 2,
-        }))
+        }
     );
     // A motion mode persists, an axis that is not given stays.
     let motion = run_move(&mut interpreter, "N70.9 X21");
@@ -281,10 +380,21 @@ fn the_corner_tolerance_is_that_of_the_moves_start() {
 #[test]
 fn dwell_pause_and_end() {
     let mut interpreter = after(&["G0 X10 Y0", "G91 G61 G20 F1", "G1"]);
-    let dwell = Command::Dwell { seconds: 0.1 };
+    let dwell = Command {
+        dwell_s: Some(0.1),
+        ..Command::default()
+    };
+    let pause = Command {
+        flow: Some(ProgramFlow::Pause),
+        ..Command::default()
+    };
+    let end = Command {
+        flow: Some(ProgramFlow::End),
+        ..Command::default()
+    };
     assert_eq!(run(&mut interpreter, "G4 P.1"), Ok(dwell));
-    assert_eq!(run(&mut interpreter, "M0"), Ok(Command::Pause));
-    assert_eq!(run(&mut interpreter, "M30"), Ok(Command::End));
+    assert_eq!(run(&mut interpreter, "M0"), Ok(pause));
+    assert_eq!(run(&mut interpreter, "M30"), Ok(end.clone()));
     let modal = *interpreter.modal();
     assert_eq!(modal.motion(), Motion::Linear);
     assert_eq!(modal.distance(), Distance::Absolute);
@@ -293,7 +403,7 @@ fn dwell_pause_and_end() {
     assert_eq!(modal.feed_mm_per_min(), Some(25.4));
     assert_eq!(modal.position(), Some(pose(10.0, 0.0, 0.0, 0.0)));
     assert_eq!(run_move(&mut interpreter, "X1").line, 1);
-    assert_eq!(run(&mut interpreter, "M2"), Ok(Command::End));
+    assert_eq!(run(&mut interpreter, "M2"), Ok(end));
 }
 
 #[test]
@@ -303,10 +413,10 @@ fn nothing_changes_before_commit() {
     let line = Line::parse(b"G91 G20 G61 G1 X1 F100").unwrap();
     let first = interpreter.interpret(&line).unwrap();
     assert_eq!(*interpreter.modal(), before);
-    assert_eq!(interpreter.interpret(&line), Ok(first));
-    interpreter.commit(first.0);
-    assert_eq!(*interpreter.modal(), first.0);
-    assert_ne!(first.0, before);
+    assert_eq!(interpreter.interpret(&line), Ok(first.clone()));
+    interpreter.commit(&first);
+    assert_eq!(interpreter.modal(), first.modal());
+    assert_ne!(*first.modal(), before);
 }
 
 /// 0.1 mm is no multiple of 2^-19 mm: rounded move by move, it would drift by 11 µm.

@@ -10,7 +10,7 @@ use micromath::F32Ext;
 use planner_core::config::{ConfigError, Robot, RobotConfig, SettingError};
 use planner_core::gcode::{self, LineBuffer};
 use planner_core::motion::MotionState;
-use planner_core::planner::{Accepted, Planner};
+use planner_core::planner::Planner;
 use planner_core::pose::Pose;
 use planner_core::units::TICK_HZ;
 
@@ -178,17 +178,16 @@ impl<O: ByteOut> Session<O> {
     async fn gcode(&mut self, line: &[u8]) {
         match self.planner.line(line) {
             Ok(accepted) => {
-                match accepted {
-                    Accepted::Nothing => {}
-                    Accepted::Reference(pose) => self.order(Order::Place(pose)).await,
-                    Accepted::Queued => {
-                        self.link.set_program_open(true);
-                        self.cycle_start.queued();
-                    }
-                    Accepted::End => {
-                        self.link.set_program_open(false);
-                        self.cycle_start.completed();
-                    }
+                if let Some(pose) = accepted.reference {
+                    self.order(Order::Place(pose)).await;
+                }
+                if accepted.queued {
+                    self.link.set_program_open(true);
+                    self.cycle_start.queued();
+                }
+                if accepted.ended {
+                    self.link.set_program_open(false);
+                    self.cycle_start.completed();
                 }
                 self.say_ok().await;
             }

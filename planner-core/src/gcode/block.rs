@@ -1,257 +1,176 @@
 //! The words of a line, sorted into commands and values.
 
+use super::code::{
+    Code, CoolantChange, Group, Groups, NonModal, PathControl, RobotCode, ToolLength,
+};
+use super::command::ProgramFlow;
 use super::error::Error;
 use super::line::{Line, Word};
-use super::modal::{Distance, Motion, Units};
+use super::modal::{Coolant, Modal};
 use super::number::Decimal;
 
 /// Largest tool number, Grbl's.
-pub(super) const MAX_TOOL: i64 = 255;
+pub(super) const MAX_TOOL: u8 = 255;
 
-/// Path control, G61 and G64.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum PathControl {
-    /// G61: stand still at every corner.
-    ExactStop,
-    /// G64: round corners within the tolerance P, or the robot's own.
-    Blend,
-}
+/// Letters with a value.
+const VALUE_LETTERS: u32 = letters(b"CFIJKLNPQRSTXYZ");
 
-/// What M0, M2 and M30 do to the program.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ProgramFlow {
-    /// M0.
-    Pause,
-    /// M2, M30.
-    End,
-}
+/// Letters whose value is zero or more.
+const UNSIGNED_LETTERS: u32 = letters(b"FNPST");
 
 /// The commands and values of one line: no group and no value occurs twice, no
 /// letter and no command is unknown. Whether they fit together is still open.
-#[derive(Debug, Default)]
-pub(super) struct Block {
-    pub motion: Option<Motion>,
-    pub units: Option<Units>,
-    pub distance: Option<Distance>,
+#[derive(Debug)]
+pub(super) struct Block<'l> {
+    /// The modal state, which the line's commands change.
+    pub modal: &'l mut Modal,
+    /// The groups of the line's commands.
+    pub groups: Groups,
+    pub non_modal: Option<NonModal>,
+    pub tool_length: Option<ToolLength>,
     pub path_control: Option<PathControl>,
-    pub program_flow: Option<ProgramFlow>,
-    pub dwell: bool,
-    pub cancel_tool_length: bool,
-    values: Values,
+    pub flow: Option<ProgramFlow>,
+    pub robot: Option<RobotCode>,
+    values: &'l [Decimal],
+    /// Letters whose value nothing has used, A being bit 0.
+    unused: u32,
+    /// Where the value of each letter stands among the values.
+    places: [u8; 26],
 }
 
-/// A G or M command that the robot knows.
-#[derive(Clone, Copy)]
-enum Code {
-    Motion(Motion),
-    Dwell,
-    PlaneXy,
-    Units(Units),
-    NoCutterCompensation,
-    NoToolLength,
-    /// True for G54, the only one there is.
-    WorkOffset(bool),
-    PathControl(PathControl),
-    Distance(Distance),
-    ArcCentresIncremental,
-    FeedPerMinute,
-    /// None for M1, which stops nothing.
-    ProgramFlow(Option<ProgramFlow>),
-    Spindle,
-    ToolChange,
-    Coolant,
-}
-
-/// Modal groups of NIST RS274/NGC v3, table 4: one command of each to a line.
-#[derive(Clone, Copy)]
-enum Group {
-    NonModal,
-    Motion,
-    Plane,
-    Distance,
-    ArcDistance,
-    FeedMode,
-    Units,
-    CutterCompensation,
-    ToolLength,
-    WorkOffset,
-    PathControl,
-    ProgramFlow,
-    ToolChange,
-    Spindle,
-    Coolant,
-}
-
-impl Block {
+impl<'l> Block<'l> {
     /// Sorts the words of a line.
     ///
     /// # Errors
     /// Codes 4, 20, 21, 23, 24, 25, 29 and 38, for the first word that is wrong.
-    pub(super) fn collect(line: &Line) -> Result<Self, Error> {
-        let mut block = Self::default();
-        let mut groups_seen = 0_u16;
-        for &Word { letter, value } in line.words() {
+    pub(super) fn collect(line: &'l Line, modal: &'l mut Modal) -> Result<Self, Error> {
+        let mut block = Self {
+            modal,
+            groups: Groups::default(),
+            non_modal: None,
+            tool_length: None,
+            path_control: None,
+            flow: None,
+            robot: None,
+            values: line.values(),
+            unused: 0,
+            places: [0; 26],
+        };
+        let mut axes_are_used = false;
+        for (place, Word { letter, value }) in (0..).zip(line.words()) {
             if !matches!(letter, b'G' | b'M') {
-                block.values.insert(letter, value)?;
+                block.insert(letter, value, place)?;
                 continue;
             }
             let code = Code::new(letter, value)?;
-            if matches!(code, Code::WorkOffset(false)) {
-                return Err(Error::WorkOffset);
-            }
-            let group = 1 << code.group() as u16;
-            if groups_seen & group != 0 {
+            if !block.groups.insert(code.group()) {
                 let number = value;
                 return Err(Error::ModalConflict { letter, number });
             }
-            groups_seen |= group;
+            if code.uses_axes() && core::mem::replace(&mut axes_are_used, true) {
+                return Err(Error::AxisConflict);
+            }
             block.set(code);
-        }
-        let moves = !matches!(block.motion, None | Some(Motion::Cancelled));
-        if block.cancel_tool_length && moves {
-            return Err(Error::AxisConflict);
         }
         Ok(block)
     }
 
     /// Uses a value: what has not been used when all is done is an error.
     pub(super) fn take(&mut self, letter: u8) -> Option<Decimal> {
-        self.values.slot(letter).and_then(Option::take)
+        let value = self.value(letter)?;
+        self.unused &= !bit(letter);
+        Some(value)
+    }
+
+    /// A value that has not been used.
+    pub(super) fn value(&self, letter: u8) -> Option<Decimal> {
+        if self.unused & bit(letter) == 0 {
+            return None;
+        }
+        let place = self.places.get(usize::from(letter.wrapping_sub(b'A')))?;
+        self.values.get(usize::from(*place)).copied()
     }
 
     /// A letter whose value nothing has used.
-    pub(super) fn unused(&self) -> Option<u8> {
-        let mut letters = (b'A'..=b'Z').zip(&self.values.0);
-        letters.find_map(|(letter, value)| value.map(|_| letter))
+    pub(super) const fn unused(&self) -> Option<u8> {
+        match self.unused {
+            0 => None,
+            unused => Some(b'A' + unused.trailing_zeros() as u8),
+        }
+    }
+
+    fn insert(&mut self, letter: u8, value: Decimal, place: u8) -> Result<(), Error> {
+        let bit = bit(letter);
+        if VALUE_LETTERS & bit == 0 {
+            return Err(Error::UnsupportedWord { letter });
+        }
+        if letter == b'T' && value >= Decimal::from_integer(i32::from(MAX_TOOL) + 1) {
+            return Err(Error::ToolNumber);
+        }
+        if self.unused & bit != 0 {
+            return Err(Error::RepeatedWord { letter });
+        }
+        if UNSIGNED_LETTERS & bit != 0 && value < Decimal::ZERO {
+            return Err(Error::Negative { letter });
+        }
+        self.unused |= bit;
+        if let Some(slot) = self.places.get_mut(usize::from(letter.wrapping_sub(b'A'))) {
+            *slot = place;
+        }
+        Ok(())
     }
 
     const fn set(&mut self, code: Code) {
         match code {
-            Code::Motion(motion) => self.motion = Some(motion),
-            Code::Dwell => self.dwell = true,
-            Code::Units(units) => self.units = Some(units),
-            Code::NoToolLength => self.cancel_tool_length = true,
+            Code::Motion(motion) => self.modal.motion = motion,
+            Code::NonModal(command) => self.non_modal = Some(command),
+            Code::Plane(plane) => self.modal.plane = plane,
+            Code::Units(units) => self.modal.units = units,
+            Code::ToolLength(tool_length) => self.tool_length = Some(tool_length),
+            Code::WorkSystem(system) => self.modal.work_system = system,
             Code::PathControl(path_control) => self.path_control = Some(path_control),
-            Code::Distance(distance) => self.distance = Some(distance),
-            Code::ProgramFlow(flow) => self.program_flow = flow,
+            Code::Distance(distance) => self.modal.distance = distance,
+            Code::FeedMode(mode) => self.modal.feed_mode = mode,
+            Code::Flow(flow) => self.flow = Some(flow),
+            Code::Spindle(spindle) => self.modal.spindle = spindle,
+            Code::Coolant(CoolantChange::Mist) => self.modal.coolant.mist = true,
+            Code::Coolant(CoolantChange::Flood) => self.modal.coolant.flood = true,
+            Code::Coolant(CoolantChange::Off) => {
+                self.modal.coolant = Coolant {
+                    mist: false,
+                    flood: false,
+                };
+            }
+            Code::Robot(code) => self.robot = Some(code),
             // These are what the robot does anyway, or what it does not have.
-            Code::PlaneXy
-            | Code::NoCutterCompensation
-            | Code::WorkOffset(_)
+            Code::NoCutterCompensation
+            | Code::NoWorkSystem
             | Code::ArcCentresIncremental
-            | Code::FeedPerMinute
-            | Code::Spindle
-            | Code::ToolChange
-            | Code::Coolant => {}
+            | Code::OptionalStop
+            | Code::ToolChange => {}
         }
+    }
+
+    /// Whether the line has a command of the motion group, G80 included.
+    pub(super) const fn has_motion_code(&self) -> bool {
+        self.groups.has(Group::Motion)
     }
 }
 
-impl Code {
-    fn new(letter: u8, number: Decimal) -> Result<Self, Error> {
-        let find = |tenths| match letter {
-            b'G' => Self::general(tenths),
-            _ => Self::miscellaneous(tenths),
-        };
-        if let Some(code) = number.tenths().and_then(find) {
-            return Ok(code);
-        }
-        // As in Grbl, decimals are the error only where the integer alone would do
-        // and no relative with a decimal exists (G61.1, G90.1, G91.2).
-        let integer = number.integer();
-        let is_integer = Decimal::from_nano(integer * 1_000_000_000) == number;
-        let has_relatives = letter == b'G' && matches!(integer, 61 | 90 | 91);
-        if !is_integer && !has_relatives && find(integer * 10).is_some() {
-            Err(Error::NotAnInteger { letter, number })
-        } else {
-            Err(Error::UnsupportedCommand { letter, number })
-        }
-    }
-
-    /// A G command, by ten times its number.
-    const fn general(tenths: i64) -> Option<Self> {
-        Some(match tenths {
-            0 => Self::Motion(Motion::Rapid),
-            10 => Self::Motion(Motion::Linear),
-            20 => Self::Motion(Motion::ArcClockwise),
-            30 => Self::Motion(Motion::ArcCounterClockwise),
-            40 => Self::Dwell,
-            170 => Self::PlaneXy,
-            200 => Self::Units(Units::Inches),
-            210 => Self::Units(Units::Millimetres),
-            400 => Self::NoCutterCompensation,
-            490 => Self::NoToolLength,
-            540 => Self::WorkOffset(true),
-            550 | 560 | 570 | 580 | 590 => Self::WorkOffset(false),
-            610 => Self::PathControl(PathControl::ExactStop),
-            640 => Self::PathControl(PathControl::Blend),
-            800 => Self::Motion(Motion::Cancelled),
-            900 => Self::Distance(Distance::Absolute),
-            910 => Self::Distance(Distance::Incremental),
-            911 => Self::ArcCentresIncremental,
-            940 => Self::FeedPerMinute,
-            _ => return None,
-        })
-    }
-
-    /// An M command, by ten times its number.
-    const fn miscellaneous(tenths: i64) -> Option<Self> {
-        Some(match tenths {
-            0 => Self::ProgramFlow(Some(ProgramFlow::Pause)),
-            10 => Self::ProgramFlow(None),
-            20 | 300 => Self::ProgramFlow(Some(ProgramFlow::End)),
-            30 | 40 | 50 => Self::Spindle,
-            60 => Self::ToolChange,
-            70 | 80 | 90 => Self::Coolant,
-            _ => return None,
-        })
-    }
-
-    const fn group(self) -> Group {
-        match self {
-            Self::Motion(_) => Group::Motion,
-            Self::Dwell => Group::NonModal,
-            Self::PlaneXy => Group::Plane,
-            Self::Units(_) => Group::Units,
-            Self::NoCutterCompensation => Group::CutterCompensation,
-            Self::NoToolLength => Group::ToolLength,
-            Self::WorkOffset(_) => Group::WorkOffset,
-            Self::PathControl(_) => Group::PathControl,
-            Self::Distance(_) => Group::Distance,
-            Self::ArcCentresIncremental => Group::ArcDistance,
-            Self::FeedPerMinute => Group::FeedMode,
-            Self::ProgramFlow(_) => Group::ProgramFlow,
-            Self::Spindle => Group::Spindle,
-            Self::ToolChange => Group::ToolChange,
-            Self::Coolant => Group::Coolant,
-        }
+/// The bit of a letter; none for what is no letter.
+const fn bit(letter: u8) -> u32 {
+    match letter {
+        b'A'..=b'Z' => 1 << (letter - b'A'),
+        _ => 0,
     }
 }
 
-/// The value of every letter given, A to Z.
-#[derive(Debug, Default)]
-struct Values([Option<Decimal>; 26]);
-
-impl Values {
-    fn slot(&mut self, letter: u8) -> Option<&mut Option<Decimal>> {
-        self.0.get_mut(usize::from(letter.wrapping_sub(b'A')))
+const fn letters(list: &[u8]) -> u32 {
+    let mut bits = 0;
+    let mut rest = list;
+    while let [letter, after @ ..] = rest {
+        bits |= bit(*letter);
+        rest = after;
     }
-
-    fn insert(&mut self, letter: u8, value: Decimal) -> Result<(), Error> {
-        let known = b"CFIJKLNPRSTXYZ".contains(&letter);
-        let Some(slot) = self.slot(letter).filter(|_| known) else {
-            return Err(Error::UnsupportedWord { letter });
-        };
-        if letter == b'T' && value.integer() > MAX_TOOL {
-            return Err(Error::ToolNumber);
-        }
-        if slot.is_some() {
-            return Err(Error::RepeatedWord { letter });
-        }
-        if b"FNPST".contains(&letter) && value < Decimal::ZERO {
-            return Err(Error::Negative { letter });
-        }
-        *slot = Some(value);
-        Ok(())
-    }
+    bits
 }

@@ -1,26 +1,57 @@
 //! What a line asks the planner to do.
 
+use heapless::Vec;
+
+use crate::kinematics::Elbow;
 use crate::path::PathSegment;
 use crate::pose::Pose;
+use crate::prefilter::PrefilterConfig;
 
-/// The action of one line.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Command {
-    /// Nothing but modal state, or a move that ends where it starts.
-    Nothing,
+/// Output of M3, M4 (on: the gripper closes) and M5.
+pub const GRIPPER: u8 = 1 << 0;
+
+/// Output of M7, M8 (on: blow-off) and M9.
+pub const BLOW_OFF: u8 = 1 << 1;
+
+/// Most actions that one line asks for: outputs, a dwell or an intermediate point, a move,
+/// and at the program's end outputs again and the end.
+pub const MAX_ACTIONS_A_LINE: usize = 5;
+
+/// The actions of one line, in the order in which they are executed: Grbl's.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Command {
+    /// A change of the robot, which stands in a line of its own.
+    pub robot: Option<RobotChange>,
+    /// New state of all outputs, if it changes: [`GRIPPER`] and [`BLOW_OFF`].
+    pub outputs: Option<u8>,
+    /// Stand still for so many seconds, zero or more (G4).
+    pub dwell_s: Option<f32>,
     /// Where the robot is: the first point of a program that began without a position.
-    Reference(Pose),
-    /// A motion.
-    Move(Move),
-    /// Stand still (G4).
-    Dwell {
-        /// For how long; zero or more.
-        seconds: f32,
-    },
-    /// Stop (M0). The planner stops the robot there and goes on.
+    pub reference: Option<Pose>,
+    /// Motions: G28 and G30 may have an intermediate point.
+    pub moves: Vec<Move, 2>,
+    /// New state of all outputs after the motion, if it changes (M2, M30).
+    pub outputs_after: Option<u8>,
+    /// What becomes of the program.
+    pub flow: Option<ProgramFlow>,
+}
+
+/// What M0, M2 and M30 do to the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProgramFlow {
+    /// M0: stop until the cycle start.
     Pause,
-    /// The program is complete (M2, M30).
+    /// M2, M30: the program is complete.
     End,
+}
+
+/// A change of the robot. It takes effect when everything before it stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RobotChange {
+    /// M100: this prefilter from here on. Its values are as given, unchecked.
+    Prefilter(PrefilterConfig),
+    /// M101, M102: the elbow on this side from here on.
+    Elbow(Elbow),
 }
 
 /// A motion from where the last one ended. It has a length: in space, or in yaw.
@@ -32,7 +63,7 @@ pub struct Move {
     pub feed: Feed,
     /// Largest miss of the corner at the **start** of this move; 0 is an exact stop.
     pub corner_tolerance_mm: f32,
-    /// The N word, or the number of the line in its program.
+    /// The N word, or the number of the line in its program; 0 for a jog without N.
     pub line: u32,
 }
 
@@ -43,4 +74,6 @@ pub enum Feed {
     Rapid,
     /// Along the path of X, Y and Z, above zero; in **deg/s** for a motion of the yaw alone.
     MmPerS(f32),
+    /// The whole motion in so many seconds, above zero (G93).
+    Seconds(f32),
 }

@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use crate::prefilter::Kind;
+
 use super::block::MAX_TOOL;
 use super::interpreter::MAX_LINE_NUMBER;
 use super::line::MAX_WORDS;
@@ -32,7 +34,14 @@ pub enum Error {
     },
     /// 11: more characters than a line may have.
     LineTooLong,
-    /// 20: a G or M number that the robot does not have.
+    /// 15: a jog beyond the range of an axis.
+    JogOutOfRange {
+        /// The axis.
+        letter: u8,
+    },
+    /// 16: a jog with other words than axes, F, N, G20, G21, G53, G90 and G91.
+    JogSyntax,
+    /// 20: a G or M number that the robot does not have, or an L that G10 does not.
     UnsupportedCommand {
         /// `G` or `M`.
         letter: u8,
@@ -51,33 +60,37 @@ pub enum Error {
         /// The number of the second one.
         number: Decimal,
     },
-    /// 22: a feed move, and no feedrate given yet.
+    /// 22: a feed move, and no feedrate given yet; in G93 and in a jog, not in its line.
     NoFeed,
     /// 23: decimals behind a command that has none, as in `G1.5`.
     NotAnInteger {
-        /// `G` or `M`.
+        /// `G` or `M`, or `P` of M100.
         letter: u8,
         /// Its number.
         number: Decimal,
     },
-    /// 24: G49 and a motion in one line.
+    /// 24: two commands of different groups that both use axis words, as in `G0 G92`.
     AxisConflict,
     /// 25: a value given twice.
     RepeatedWord {
         /// The word's letter.
         letter: u8,
     },
-    /// 26: an arc without a target.
+    /// 26: an arc, G10, G92 or a jog without axis words.
     NoAxisWords,
     /// 27: N beyond 10,000,000.
     LineNumber,
     /// 28: G4 without P.
     NoDwellTime,
-    /// 29: G55 to G59.
+    /// 28: G10 with neither L nor P.
+    NoOffsetKind,
+    /// 29: G59.1 to G59.3, or G10 with P above 6.
     WorkOffset,
+    /// 30: G53 while neither G0 nor G1 is active.
+    MachineCoordinates,
     /// 31: axis words while G80 is active.
     AxisWordsWithoutMotion,
-    /// 32: an arc whose target has neither X nor Y.
+    /// 32: an arc whose target has no axis of its plane.
     NoAxisWordsInPlane,
     /// 33: start and target of an arc lie at unequal distances from its centre.
     ArcDoesNotClose {
@@ -97,9 +110,11 @@ pub enum Error {
         /// The word's letter.
         letter: u8,
     },
+    /// 37: G43.1 with other axis words than Z alone.
+    ToolLengthAxis,
     /// 38: T above 255.
     ToolNumber,
-    /// 61: a target that no robot of ours can reach.
+    /// 61: a target, or an offset, that no robot of ours can reach.
     OutOfRange {
         /// The axis.
         letter: u8,
@@ -113,8 +128,12 @@ pub enum Error {
     },
     /// 64: more words than a line can use.
     TooManyWords,
-    /// 65: two of motion, G4, M0, M2 and M30 in one line, or G4 beside G64: whose is P?
-    OneActionPerLine,
+    /// 65: G4 or G10 beside G64 (whose is P?), or M100 to M102 beside another command.
+    OwnLine,
+    /// 75: an arc in G18 or G19.
+    ArcPlane,
+    /// 76: M100 with a P that names no prefilter.
+    NoSuchPrefilter,
 }
 
 impl Error {
@@ -130,6 +149,8 @@ impl Error {
             Self::Number { .. } => 2,
             Self::Negative { .. } => 4,
             Self::LineTooLong => 11,
+            Self::JogOutOfRange { .. } => 15,
+            Self::JogSyntax => 16,
             Self::UnsupportedCommand { .. } | Self::UnsupportedWord { .. } => 20,
             Self::ModalConflict { .. } => 21,
             Self::NoFeed => 22,
@@ -138,20 +159,24 @@ impl Error {
             Self::RepeatedWord { .. } => 25,
             Self::NoAxisWords => 26,
             Self::LineNumber => 27,
-            Self::NoDwellTime => 28,
+            Self::NoDwellTime | Self::NoOffsetKind => 28,
             Self::WorkOffset => 29,
+            Self::MachineCoordinates => 30,
             Self::AxisWordsWithoutMotion => 31,
             Self::NoAxisWordsInPlane => 32,
             Self::ArcDoesNotClose { .. } | Self::ArcWithoutChord => 33,
             Self::ArcTooSmall | Self::ArcTooLarge => 34,
             Self::NoArcOffsets => 35,
             Self::UnusedWord { .. } => 36,
+            Self::ToolLengthAxis => 37,
             Self::ToolNumber => 38,
             Self::OutOfRange { .. } => 61,
             Self::PositionUnknown => 62,
             Self::Checksum { .. } => 63,
             Self::TooManyWords => 64,
-            Self::OneActionPerLine => 65,
+            Self::OwnLine => 65,
+            Self::ArcPlane => 75,
+            Self::NoSuchPrefilter => 76,
         }
     }
 }
@@ -179,6 +204,16 @@ impl fmt::Display for Error {
                     "the line is too long: split it, {MAX_LINE_BYTES} characters are the most"
                 );
             }
+            Self::JogOutOfRange { letter } => {
+                return write!(
+                    f,
+                    "the jog takes {} beyond the number range: jog less far",
+                    char::from(letter)
+                );
+            }
+            Self::JogSyntax => {
+                "a jog has axis words and F, and G20, G21, G53, G90 or G91: remove the others"
+            }
             Self::UnsupportedCommand { letter, number } => {
                 let letter = char::from(letter);
                 return write!(f, "{letter}{number} is not supported: remove it");
@@ -202,11 +237,11 @@ impl fmt::Display for Error {
                 let letter = char::from(letter);
                 return write!(f, "{letter}{number} does not exist: give a whole number");
             }
-            Self::AxisConflict => "G49 cannot share a line with a motion: give it its own",
+            Self::AxisConflict => "two commands want the axis words: give each its own line",
             Self::RepeatedWord { letter } => {
                 return write!(f, "{} is given twice: keep one of them", char::from(letter));
             }
-            Self::NoAxisWords => "the arc has no target: give X or Y",
+            Self::NoAxisWords => "a command lacks its axis words: give X, Y, Z or C",
             Self::LineNumber => {
                 return write!(
                     f,
@@ -214,7 +249,11 @@ impl fmt::Display for Error {
                 );
             }
             Self::NoDwellTime => "G4 needs a time: give P in seconds",
-            Self::WorkOffset => "there is one work offset only: use G54",
+            Self::NoOffsetKind => "G10 needs its kind: give L2 or L20, and P",
+            Self::WorkOffset => {
+                "there are six coordinate systems: use G54 to G59, and P0 to P6 with G10"
+            }
+            Self::MachineCoordinates => "G53 works with straight motion only: give G0 or G1",
             Self::AxisWordsWithoutMotion => {
                 "G80 has ended all motion: give G0, G1, G2 or G3 before an axis word"
             }
@@ -241,6 +280,7 @@ impl fmt::Display for Error {
                     char::from(letter)
                 );
             }
+            Self::ToolLengthAxis => "G43.1 sets the tool length: give Z and no other axis",
             Self::ToolNumber => {
                 return write!(f, "the tool number is too large: {MAX_TOOL} is the most");
             }
@@ -252,7 +292,7 @@ impl fmt::Display for Error {
                 );
             }
             Self::PositionUnknown => {
-                "the position is unknown: begin with an absolute G0 or G1 that gives X and Y"
+                "the position is unknown: home, or begin with an absolute G0 or G1 with X and Y"
             }
             Self::Checksum { computed } => {
                 return write!(f, "the checksum should be {computed}: send the line again");
@@ -263,8 +303,16 @@ impl fmt::Display for Error {
                     "the line has too many words: split it, {MAX_WORDS} are the most"
                 );
             }
-            Self::OneActionPerLine => {
-                "the line asks for two things: give each motion, G4, M0, M2 and M30 its own"
+            Self::OwnLine => {
+                "G64 beside G4 or G10, or M100 to M102 beside others: give each its own line"
+            }
+            Self::ArcPlane => "an arc must lie in the XY plane: give G17 before it",
+            Self::NoSuchPrefilter => {
+                return write!(
+                    f,
+                    "there is no such prefilter: give M100 a P of 0 to {}",
+                    Kind::ALL.len() - 1
+                );
             }
         };
         f.write_str(sentence)
@@ -296,6 +344,8 @@ mod tests {
             ),
             (Error::Negative { letter }, 4),
             (Error::LineTooLong, 11),
+            (Error::JogOutOfRange { letter }, 15),
+            (Error::JogSyntax, 16),
             (Error::UnsupportedCommand { letter, number }, 20),
             (Error::UnsupportedWord { letter }, 20),
             (Error::ModalConflict { letter, number }, 21),
@@ -306,7 +356,9 @@ mod tests {
             (Error::NoAxisWords, 26),
             (Error::LineNumber, 27),
             (Error::NoDwellTime, 28),
+            (Error::NoOffsetKind, 28),
             (Error::WorkOffset, 29),
+            (Error::MachineCoordinates, 30),
             (Error::AxisWordsWithoutMotion, 31),
             (Error::NoAxisWordsInPlane, 32),
             (
@@ -320,6 +372,7 @@ mod tests {
             (Error::ArcTooLarge, 34),
             (Error::NoArcOffsets, 35),
             (Error::UnusedWord { letter }, 36),
+            (Error::ToolLengthAxis, 37),
             (Error::ToolNumber, 38),
             (
                 Error::Number {
@@ -332,7 +385,9 @@ mod tests {
             (Error::PositionUnknown, 62),
             (Error::Checksum { computed: 57 }, 63),
             (Error::TooManyWords, 64),
-            (Error::OneActionPerLine, 65),
+            (Error::OwnLine, 65),
+            (Error::ArcPlane, 75),
+            (Error::NoSuchPrefilter, 76),
         ];
         for (error, code) in errors {
             assert_eq!(error.code(), code, "{error:?}");

@@ -29,14 +29,19 @@ pub struct Word {
 /// business.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Line {
-    words: Vec<Word, MAX_WORDS>,
+    /// Letters and values apart, so that a line is no larger than it must be: it is moved.
+    letters: Vec<u8, MAX_WORDS>,
+    values: Vec<Decimal, MAX_WORDS>,
+    has_checksum: bool,
 }
 
 impl Line {
     /// Reads one line, given without its line end. No words is a line, too.
     ///
     /// A `*` and a number end the words: the checksum, which is the exclusive or of
-    /// all bytes before the `*` (RepRap's convention), is verified.
+    /// all bytes before the `*` (RepRap's convention), is verified. One flipped bit makes
+    /// `*` the begin of a comment, so a link that relies on checksums has to insist on
+    /// [`Line::has_checksum`].
     ///
     /// # Errors
     /// - [`Error::LineTooLong`]: more than [`MAX_LINE_BYTES`] characters that mean something
@@ -63,9 +68,51 @@ impl Line {
     }
 
     /// The words, in their order.
+    pub fn words(&self) -> impl DoubleEndedIterator<Item = Word> {
+        let words = self.letters.iter().zip(&self.values);
+        words.map(|(&letter, &value)| Word { letter, value })
+    }
+
+    /// The values of the words, in their order.
+    pub(super) fn values(&self) -> &[Decimal] {
+        &self.values
+    }
+
+    /// Whether it carried a checksum, and so the right one.
     #[must_use]
-    pub fn words(&self) -> &[Word] {
-        &self.words
+    pub const fn has_checksum(&self) -> bool {
+        self.has_checksum
+    }
+
+    /// The N word, or the last one if there are several; decimals are cut off. It may be
+    /// negative in a line that sets the number.
+    #[must_use]
+    pub fn number(&self) -> Option<i32> {
+        let word = self.words().rev().find(|word| word.letter == b'N')?;
+        i32::try_from(word.value.integer()).ok()
+    }
+
+    /// Whether it does nothing but set the line number: `M110 N7`, or as some senders say
+    /// it, `N-1 M110 N-1`. The next line has the number that follows.
+    #[must_use]
+    pub fn sets_number(&self) -> bool {
+        let m110 = Word {
+            letter: b'M',
+            value: Decimal::from_integer(110),
+        };
+        let mut is_set = false;
+        self.words().all(|word| {
+            is_set |= word == m110;
+            word.letter == b'N' || word == m110
+        }) && is_set
+    }
+
+    fn push(&mut self, word: Word) -> Result<(), Error> {
+        let letter = self.letters.push(word.letter);
+        letter.map_err(|_| Error::TooManyWords)?;
+        self.values
+            .push(word.value)
+            .map_err(|_| Error::TooManyWords)
     }
 
     /// Reads characters that all mean something; `checksum` is what they should announce.
@@ -75,11 +122,12 @@ impl Line {
             match *letter {
                 b'*' => {
                     verify_checksum(after, checksum)?;
+                    line.has_checksum = true;
                     break;
                 }
                 letter @ b'A'..=b'Z' => {
                     let (word, rest) = parse_word(letter, after)?;
-                    line.words.push(word).map_err(|_| Error::TooManyWords)?;
+                    line.push(word)?;
                     text = rest;
                 }
                 found => return Err(Error::ExpectedLetter { found }),
@@ -124,7 +172,6 @@ mod tests {
         let line = Line::parse(text.as_bytes()).unwrap();
         let words: Vec<String> = line
             .words()
-            .iter()
             .map(|word| format!("{}{}", char::from(word.letter), word.value))
             .collect();
         words.join(" ")
@@ -190,6 +237,29 @@ mod tests {
     }
 
     #[test]
+    fn numbers_and_checksums_let_a_sequence_be_checked() {
+        for (text, number, has_checksum, sets_number) in [
+            ("G1 X1", None, false, false),
+            ("N3 T0*57", Some(3), true, false),
+            ("N3.9 G0 X1", Some(3), false, false),
+            ("N-1 M110 N-1*125", Some(-1), true, true),
+            ("M110 N7", Some(7), false, true),
+            ("N6 M110 N7", Some(7), false, true),
+            ("M110", None, false, true),
+            ("M110 N7 X1", Some(7), false, false),
+            ("N999999999 X1", Some(999_999_999), false, false),
+            ("", None, false, false),
+        ] {
+            let line = Line::parse(text.as_bytes()).unwrap();
+            assert_eq!(line.number(), number, "{text}");
+            assert_eq!(line.has_checksum(), has_checksum, "{text}");
+            assert_eq!(line.sets_number(), sets_number, "{text}");
+        }
+        // One flipped bit, and the checksum is a comment.
+        assert!(!Line::parse(b"N3 T0(57").unwrap().has_checksum());
+    }
+
+    #[test]
     fn full_is_an_error() {
         let mut text = vec![b'0'; MAX_LINE_BYTES + 1];
         text[0] = b'X';
@@ -225,7 +295,7 @@ mod tests {
                 .map(|&(letter, nano)| format!("{}{} ", char::from(letter), Decimal::from_nano(nano)))
                 .collect();
             let line = Line::parse(text.as_bytes()).unwrap();
-            let read: Vec<(u8, i64)> = line.words().iter().map(|word| (word.letter, word.value.to_nano())).collect();
+            let read: Vec<(u8, i64)> = line.words().map(|word| (word.letter, word.value.to_nano())).collect();
             prop_assert_eq!(read, words);
         }
     }

@@ -4,31 +4,40 @@
 //! |---|---|---|---|
 //! | [`LineBuffer`] | bytes of a link | text lines, realtime bytes | [`Received::Overflow`] |
 //! | [`Line`] | one text line | words with exact decimals | [`Error`] |
-//! | [`Interpreter`] | words, modal state | [`Command`] and the next [`Modal`] state | [`Error`] |
+//! | [`Interpreter`] | words, [`Modal`] state, [`Offsets`] | [`Command`] and what it leaves behind | [`Error`] |
 //!
 //! Every step is a pure state machine without I/O, and none can panic, whatever
-//! the bytes. [`Interpreter::interpret`] changes nothing: the caller commits the
-//! new modal state once it has accepted the command, so that a line refused by
-//! the planner leaves no trace.
+//! the bytes. [`Interpreter::interpret`] changes nothing: the caller commits what
+//! the line leaves behind once it has accepted the command, so that a line refused
+//! by the planner leaves no trace.
 //!
 //! The parser is our own: the crate `gcode` (0.7) reads numbers as `f32`, takes
 //! `X1 0` for two tokens and recovers from errors where Grbl names them by number.
 
 mod arc;
 mod block;
+mod code;
 mod command;
 mod error;
 mod interpreter;
 mod lexical;
 mod line;
 mod modal;
+mod motion;
 mod number;
+mod offsets;
+mod parser_state;
+mod position;
 mod receiver;
 
-pub use command::{Command, Feed, Move};
+pub use command::{
+    BLOW_OFF, Command, Feed, GRIPPER, MAX_ACTIONS_A_LINE, Move, ProgramFlow, RobotChange,
+};
 pub use error::Error;
-pub use interpreter::Interpreter;
+pub use interpreter::{Interpreted, Interpreter};
 pub use line::{Line, MAX_WORDS, Word};
-pub use modal::{Defaults, Distance, Modal, Motion, Units};
+pub use modal::{Coolant, Defaults, Distance, FeedMode, Modal, Motion, Plane, Spindle, Units};
 pub use number::{Decimal, NumberError};
+pub use offsets::{Offsets, WORK_SYSTEMS};
+pub use parser_state::ParserState;
 pub use receiver::{LineBuffer, MAX_LINE_BYTES, Received};

@@ -1,16 +1,38 @@
 //! What one line leaves behind for the next.
 
-use crate::pose::{AXES, Pose};
-use crate::units::LengthMm;
+use crate::kinematics::Elbow;
+use crate::pose::Pose;
+use crate::prefilter::PrefilterConfig;
 
+use super::command::{BLOW_OFF, GRIPPER};
 use super::error::Error;
 use super::number::Decimal;
+use super::position::Position;
 
 /// Settings of the robot that a program starts from.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Defaults {
     /// Corner tolerance until G61 or G64 P, and after G64 without P.
     pub corner_tolerance_mm: f32,
+    /// The prefilter until M100.
+    pub prefilter: PrefilterConfig,
+    /// The elbow's side until M101 or M102.
+    pub elbow: Elbow,
+    /// Whether the first absolute G0 or G1 with X and Y says where the robot is, while that
+    /// is unknown. Otherwise nothing moves before homing.
+    pub first_point_declares: bool,
+}
+
+impl Default for Defaults {
+    /// Exact stops, the default prefilter and elbow; the first point declares.
+    fn default() -> Self {
+        Self {
+            corner_tolerance_mm: 0.0,
+            prefilter: PrefilterConfig::default(),
+            elbow: Elbow::default(),
+            first_point_declares: true,
+        }
+    }
 }
 
 /// Motion mode: what an axis word without a command does.
@@ -27,6 +49,18 @@ pub enum Motion {
     ArcCounterClockwise,
     /// G80, none: axis words are an error.
     Cancelled,
+}
+
+/// The plane of arcs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Plane {
+    /// G17.
+    #[default]
+    Xy,
+    /// G18.
+    Zx,
+    /// G19.
+    Yz,
 }
 
 /// Units of lengths and feeds.
@@ -62,69 +96,133 @@ pub enum Distance {
     Incremental,
 }
 
-/// A feedrate as programmed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Feedrate {
-    /// The path's, in mm/min, above zero.
-    pub mm_per_min: Decimal,
-    /// That of a motion of the yaw alone, in deg/min: the number of the F word, even in inches.
-    pub deg_per_min: Decimal,
+/// What F means.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FeedMode {
+    /// G94: units per minute.
+    #[default]
+    PerMinute,
+    /// G93: one over the minutes that the motion takes. Each feed move needs its own F.
+    InverseTime,
 }
 
-/// A position as programmed: X, Y, Z in mm and C in degrees, to 1e-9.
-///
-/// Finer than a [`Pose`], so that the roundings of incremental moves do not add up:
-/// a relative program ends where its absolute twin ends, bit for bit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Position(pub [Decimal; AXES]);
+/// The gripper, where mills have their spindle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Spindle {
+    /// M5: open.
+    #[default]
+    Off,
+    /// M3: closed.
+    Clockwise,
+    /// M4: closed.
+    CounterClockwise,
+}
 
-impl Position {
-    /// The nearest pose; an axis out of range saturates (targets are checked before).
-    pub(super) fn to_pose(self) -> Pose {
-        let [x, y, z, c] = self.0.map(|value| {
-            let limit = if value < Decimal::ZERO {
-                LengthMm::MIN
-            } else {
-                LengthMm::MAX
-            };
-            value.to_length_mm().unwrap_or(limit)
-        });
-        Pose { x, y, z, c }
+/// The blow-off, where mills have their coolant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Coolant {
+    /// M7.
+    pub mist: bool,
+    /// M8.
+    pub flood: bool,
+}
+
+/// A feedrate as programmed, above zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Feedrate {
+    /// G94.
+    PerMinute {
+        /// As programmed, in millimetres.
+        mm_per_min: Decimal,
+        /// The path's.
+        path_mm_s: f32,
+        /// That of a motion of the yaw alone: of the number of the F word, even in inches.
+        turn_deg_s: f32,
+    },
+    /// G93.
+    InverseTime {
+        /// One over the motion's minutes.
+        per_min: Decimal,
+    },
+}
+
+impl Feedrate {
+    /// The feedrate of an F word; F0 takes it back.
+    pub(super) fn new(f: Decimal, mode: FeedMode, units: Units) -> Result<Option<Self>, Error> {
+        if f <= Decimal::ZERO {
+            return Ok(None);
+        }
+        Ok(Some(match mode {
+            FeedMode::InverseTime => Self::InverseTime { per_min: f },
+            FeedMode::PerMinute => {
+                let mm_per_min = units.to_mm(b'F', f)?;
+                Self::PerMinute {
+                    mm_per_min,
+                    path_mm_s: mm_per_min.per_minute_to_f32(),
+                    turn_deg_s: f.per_minute_to_f32(),
+                }
+            }
+        }))
     }
 
-    /// A pose, exactly enough to give its bits back.
-    pub(super) fn from_pose(pose: Pose) -> Self {
-        Self([pose.x, pose.y, pose.z, pose.c].map(Decimal::from_length_mm))
+    /// Its number: mm/min, or 1/min.
+    pub(super) const fn number(&self) -> Decimal {
+        match *self {
+            Self::PerMinute { mm_per_min, .. } => mm_per_min,
+            Self::InverseTime { per_min } => per_min,
+        }
     }
 }
 
 /// The modal state: what one line leaves behind for the next.
 ///
-/// Always G17 (XY plane), G40, G54, G91.1 (arc centres are incremental) and G94
-/// (feed per minute), since the robot has no others.
+/// Always G40, and G91.1 (arc centres are incremental), since the robot has no others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Modal {
     pub(super) motion: Motion,
+    pub(super) plane: Plane,
     pub(super) units: Units,
     pub(super) distance: Distance,
-    /// None until the first F.
+    pub(super) feed_mode: FeedMode,
+    /// Coordinate system, 0 for G54.
+    pub(super) work_system: u8,
+    pub(super) spindle: Spindle,
+    pub(super) coolant: Coolant,
+    pub(super) tool: u8,
+    pub(super) spindle_speed: Decimal,
+    /// None until an F that holds.
     pub(super) feedrate: Option<Feedrate>,
     pub(super) corner_tolerance_mm: f32,
-    /// None until the first point of a program says where the robot is.
+    pub(super) prefilter: PrefilterConfig,
+    pub(super) elbow: Elbow,
+    /// In machine coordinates. None until the first point of a program, or homing, says
+    /// where the robot is.
     pub(super) position: Option<Position>,
     /// Lines counted since the program's begin.
     pub(super) lines: u32,
 }
 
 impl Modal {
-    /// The state after power-up: G0 G17 G21 G40 G54 G90 G91.1 G94, no feedrate, position unknown.
-    pub(super) const fn new(defaults: Defaults) -> Self {
+    /// The state after power-up, position unknown.
+    pub(super) const fn new(defaults: &Defaults) -> Self {
         Self {
             motion: Motion::Rapid,
+            plane: Plane::Xy,
             units: Units::Millimetres,
             distance: Distance::Absolute,
+            feed_mode: FeedMode::PerMinute,
+            work_system: 0,
+            spindle: Spindle::Off,
+            coolant: Coolant {
+                mist: false,
+                flood: false,
+            },
+            tool: 0,
+            spindle_speed: Decimal::ZERO,
             feedrate: None,
             corner_tolerance_mm: defaults.corner_tolerance_mm,
+            prefilter: defaults.prefilter,
+            elbow: defaults.elbow,
             position: None,
             lines: 0,
         }
@@ -134,6 +232,12 @@ impl Modal {
     #[must_use]
     pub const fn motion(&self) -> Motion {
         self.motion
+    }
+
+    /// Plane of arcs (G17 to G19).
+    #[must_use]
+    pub const fn plane(&self) -> Plane {
+        self.plane
     }
 
     /// Units (G20, G21).
@@ -148,10 +252,49 @@ impl Modal {
         self.distance
     }
 
-    /// Feedrate of the path in mm/min, if one has been given.
+    /// Feed mode (G93, G94).
+    #[must_use]
+    pub const fn feed_mode(&self) -> FeedMode {
+        self.feed_mode
+    }
+
+    /// Active coordinate system, 0 for G54 to 5 for G59.
+    #[must_use]
+    pub const fn work_system(&self) -> usize {
+        self.work_system as usize
+    }
+
+    /// M3 to M5.
+    #[must_use]
+    pub const fn spindle(&self) -> Spindle {
+        self.spindle
+    }
+
+    /// M7 to M9.
+    #[must_use]
+    pub const fn coolant(&self) -> Coolant {
+        self.coolant
+    }
+
+    /// State of all outputs: [`GRIPPER`] and [`BLOW_OFF`].
+    #[must_use]
+    pub const fn outputs(&self) -> u8 {
+        let gripper = match self.spindle {
+            Spindle::Off => 0,
+            Spindle::Clockwise | Spindle::CounterClockwise => GRIPPER,
+        };
+        let blow_off = if self.coolant.mist || self.coolant.flood {
+            BLOW_OFF
+        } else {
+            0
+        };
+        gripper | blow_off
+    }
+
+    /// Feedrate of the path in mm/min, or in G93 the F word of the last line; if one holds.
     #[must_use]
     pub fn feed_mm_per_min(&self) -> Option<f32> {
-        self.feedrate.map(|feedrate| feedrate.mm_per_min.to_f32())
+        self.feedrate.map(|feedrate| feedrate.number().to_f32())
     }
 
     /// Corner tolerance (G61, G64); 0 is an exact stop at every corner.
@@ -160,7 +303,19 @@ impl Modal {
         self.corner_tolerance_mm
     }
 
-    /// Where the last motion ends, if known.
+    /// The prefilter (M100).
+    #[must_use]
+    pub const fn prefilter(&self) -> &PrefilterConfig {
+        &self.prefilter
+    }
+
+    /// The elbow's side (M101, M102).
+    #[must_use]
+    pub const fn elbow(&self) -> Elbow {
+        self.elbow
+    }
+
+    /// Where the last motion ends in machine coordinates, if known.
     #[must_use]
     pub fn position(&self) -> Option<Pose> {
         self.position.map(Position::to_pose)

@@ -11,7 +11,21 @@ const DECIMALS: usize = 9;
 const NANO: i64 = 1_000_000_000;
 
 /// Largest integer part of a number as read.
-const MAX_INTEGER: i64 = 999_999_999;
+const MAX_INTEGER: u32 = 999_999_999;
+
+/// The odd factor of 10^9.
+const FIVE_TO_THE_NINTH: u32 = 5_u32.pow(9);
+
+/// 10^0 to 10^[`DECIMALS`].
+const POWERS_OF_TEN: [u32; DECIMALS + 1] = {
+    let mut powers = [1; DECIMALS + 1];
+    let mut exponent = 1;
+    while exponent <= DECIMALS {
+        powers[exponent] = powers[exponent - 1] * 10;
+        exponent += 1;
+    }
+    powers
+};
 
 /// Why a text is not a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,7 +138,7 @@ impl Decimal {
         if digits == 0 {
             return Err(NumberError::NoDigits);
         }
-        let nano = integer * NANO + fraction;
+        let nano = i64::from(integer) * NANO + i64::from(fraction);
         let nano = if negative { -nano } else { nano };
         Ok((Self { nano }, rest))
     }
@@ -132,15 +146,34 @@ impl Decimal {
     /// The integer part: the decimals are cut off.
     #[must_use]
     pub const fn integer(self) -> i64 {
-        self.nano / NANO
+        self.truncated(0)
     }
 
-    /// Ten times the value if that is an integer: 382 for the 38.2 of G38.2.
+    /// The nearest integer, a half away from zero.
     #[must_use]
-    pub const fn tenths(self) -> Option<i64> {
-        const TENTH: i64 = NANO / 10;
-        if self.nano % TENTH == 0 {
-            Some(self.nano / TENTH)
+    pub const fn rounded(self) -> i64 {
+        self.truncated(NANO.unsigned_abs() / 2)
+    }
+
+    /// The integer part of a value whose magnitude is greater by `more_nano`.
+    const fn truncated(self, more_nano: u64) -> i64 {
+        let magnitude = self.nano.unsigned_abs().saturating_add(more_nano);
+        // 10^9 = 2^9 · 5^9
+        let (quotient, _) = divide::<FIVE_TO_THE_NINTH>(magnitude >> 9);
+        self.with_sign(quotient)
+    }
+
+    /// Ten times the value if that is a whole number of 0 to 9999: 382 for the 38.2 of G38.2.
+    #[must_use]
+    pub const fn tenths(self) -> Option<u16> {
+        // A tenth is 2^8 · 5^8 steps.
+        const ODD: u32 = 5_u32.pow(8);
+        if self.nano < 0 || self.nano & 0xFF != 0 || self.nano >= 10_000 * (NANO / 10) {
+            return None;
+        }
+        let odd = (self.nano >> 8) as u32;
+        if odd.is_multiple_of(ODD) {
+            Some((odd / ODD) as u16)
         } else {
             None
         }
@@ -152,8 +185,9 @@ impl Decimal {
     /// [`NumberError::TooLarge`] beyond ±7.2e7 in.
     pub fn inches_to_mm(self) -> Result<Self, NumberError> {
         let nano = self.nano.checked_mul(127).ok_or(NumberError::TooLarge)?;
+        let (quotient, _) = divide::<5>(nano.unsigned_abs() + 2);
         Ok(Self {
-            nano: divide_rounded(nano, 5),
+            nano: self.with_sign(quotient),
         })
     }
 
@@ -164,7 +198,10 @@ impl Decimal {
     pub fn to_length_mm(self) -> Result<LengthMm, NumberError> {
         // 2^19 / 10^9 = 2^10 / 5^9
         let scaled = self.nano.checked_mul(1 << 10);
-        let bits = divide_rounded(scaled.ok_or(NumberError::TooLarge)?, 5_i64.pow(9));
+        let magnitude = scaled.ok_or(NumberError::TooLarge)?.unsigned_abs();
+        let half = u64::from(FIVE_TO_THE_NINTH / 2);
+        let (quotient, _) = divide::<FIVE_TO_THE_NINTH>(magnitude + half);
+        let bits = self.with_sign(quotient);
         match i32::try_from(bits) {
             Ok(bits) => Ok(LengthMm::from_bits(bits)),
             Err(_) => Err(NumberError::TooLarge),
@@ -184,25 +221,39 @@ impl Decimal {
     #[must_use]
     pub fn from_length_mm(length: LengthMm) -> Self {
         Self {
-            nano: divide_rounded(i64::from(length.to_bits()) * 5_i64.pow(9), 1 << 10),
+            nano: divide_rounded(
+                i64::from(length.to_bits()) * i64::from(FIVE_TO_THE_NINTH),
+                1 << 10,
+            ),
         }
     }
 
     /// The nearest `f32`, ties to even.
     #[must_use]
     pub fn to_f32(self) -> f32 {
+        self.to_f32_over::<1>(0)
+    }
+
+    /// A 60th of the value, the nearest `f32`: per second from per minute.
+    #[must_use]
+    pub fn per_minute_to_f32(self) -> f32 {
+        self.to_f32_over::<15>(2)
+    }
+
+    /// The `f32` nearest to the value / (`D` · 2^`twos`), ties to even.
+    fn to_f32_over<const D: u32>(self, twos: u32) -> f32 {
         let magnitude = self.nano.unsigned_abs();
         if magnitude == 0 {
             return 0.0;
         }
-        // Shift the top bit to 2^62: the quotient then has 33 bits or more, and what it
+        // Shift the top bit to 2^62: the quotient then has 37 bits or more, and what it
         // leaves over is kept as its last bit, so that the conversion rounds but once.
         let shift = magnitude.leading_zeros().saturating_sub(1);
-        let numerator = magnitude << shift;
-        let quotient = numerator / NANO.unsigned_abs();
-        let sticky = u64::from(!numerator.is_multiple_of(NANO.unsigned_abs()));
-        let power_of_two = f32::from_bits((127 - shift) << 23);
-        let value = (quotient | sticky) as f32 * power_of_two;
+        let (quotient, left) = divide::<FIVE_TO_THE_NINTH>(magnitude << shift);
+        let (quotient, left_too) = divide::<D>(quotient);
+        let sticky = u64::from(left || left_too);
+        let power_of_two = f32::from_bits((127 - 9 - twos - shift) << 23);
+        let value = round_to_f32(quotient | sticky) * power_of_two;
         if self.nano < 0 { -value } else { value }
     }
 
@@ -210,6 +261,12 @@ impl Decimal {
     #[must_use]
     pub fn to_f64(self) -> f64 {
         self.nano as f64 / NANO as f64
+    }
+
+    /// A magnitude with the sign of this number.
+    const fn with_sign(self, magnitude: u64) -> i64 {
+        let value = magnitude.cast_signed();
+        if self.nano < 0 { -value } else { value }
     }
 }
 
@@ -233,35 +290,68 @@ impl fmt::Display for Decimal {
 }
 
 /// The digits before the point, and what follows them.
-fn parse_integer(mut text: &[u8]) -> Result<(i64, &[u8]), NumberError> {
+fn parse_integer(mut text: &[u8]) -> Result<(u32, &[u8]), NumberError> {
     let mut integer = 0;
     while let [digit @ b'0'..=b'9', rest @ ..] = text {
-        integer = integer * 10 + i64::from(digit - b'0');
-        if integer > MAX_INTEGER {
+        if integer > MAX_INTEGER / 10 {
             return Err(NumberError::TooLarge);
         }
+        integer = integer * 10 + u32::from(digit - b'0');
         text = rest;
     }
     Ok((integer, text))
 }
 
 /// The digits after the point in steps of 1e-9, rounded, and what follows them.
-fn parse_fraction(mut text: &[u8]) -> (i64, &[u8]) {
+fn parse_fraction(mut text: &[u8]) -> (u32, &[u8]) {
     let mut fraction = 0;
-    let mut weight = NANO / 10;
-    let mut rounded = false;
+    let mut decimals = 0;
     while let [digit @ b'0'..=b'9', rest @ ..] = text {
-        let digit = i64::from(digit - b'0');
-        if weight > 0 {
-            fraction += digit * weight;
-            weight /= 10;
-        } else if !rounded {
-            fraction += i64::from(digit >= 5);
-            rounded = true;
+        let digit = u32::from(digit - b'0');
+        if decimals < DECIMALS {
+            fraction = fraction * 10 + digit;
+        } else if decimals == DECIMALS {
+            fraction += u32::from(digit >= 5);
         }
+        decimals += 1;
         text = rest;
     }
-    (fraction, text)
+    let scale = POWERS_OF_TEN.get(DECIMALS.saturating_sub(decimals));
+    (fraction * scale.copied().unwrap_or(1), text)
+}
+
+/// `numerator / D`, and whether anything is left; `D` is below 2^24.
+///
+/// A long division with digits of eight bits: the Cortex-M4 divides 32 bits in hardware,
+/// and 64 bits in a library that takes several times as long.
+const fn divide<const D: u32>(numerator: u64) -> (u64, bool) {
+    const { assert!(D > 0 && D < 1 << 24) };
+    let high = (numerator >> 32) as u32;
+    let mut remainder = high % D;
+    let mut low_quotient = 0_u32;
+    let mut low = numerator as u32;
+    let mut digits = 4;
+    while digits > 0 {
+        let part = (remainder << 8) | (low >> 24);
+        low_quotient = (low_quotient << 8) | (part / D);
+        remainder = part % D;
+        low <<= 8;
+        digits -= 1;
+    }
+    (
+        ((high / D) as u64) << 32 | low_quotient as u64,
+        remainder != 0,
+    )
+}
+
+/// The nearest `f32` to an integer below 2^62, ties to even.
+fn round_to_f32(value: u64) -> f32 {
+    // The upper bits, and whether the lower ones matter: `value as f32` takes a
+    // library for 64 bits, and one instruction for 32.
+    let shift = 32_u32.saturating_sub(value.leading_zeros());
+    let upper = (value >> shift) as u32;
+    let sticky = u32::from((u64::from(upper) << shift) != value);
+    (upper | sticky) as f32 * f32::from_bits((127 + shift) << 23)
 }
 
 /// `numerator / denominator` to the nearest integer, a half away from zero.
@@ -371,6 +461,27 @@ mod tests {
             prop_assert_eq!(value.to_f32(), oracle);
             let oracle: f64 = format!("{value}").parse().unwrap();
             prop_assert!((value.to_f64() - oracle).abs() <= oracle.abs() * 2.3e-16);
+            // 60 · nearest is within half a unit of the last place, 2^-24, of the value.
+            let per_minute = f64::from(value.per_minute_to_f32()) * 60.0;
+            prop_assert!((per_minute - oracle).abs() <= oracle.abs() * 5.97e-8, "{value}: {per_minute}");
+        }
+
+        #[test]
+        fn integers_and_tenths_are_those_of_wide_arithmetic(nano: i64, shift in 0..60) {
+            let nano = nano >> shift;
+            let value = Decimal::from_nano(nano);
+            prop_assert_eq!(value.integer(), nano / NANO);
+            let rounded = (i128::from(nano) * 2 + i128::from(NANO) * i128::from(nano.signum())) / i128::from(NANO * 2);
+            prop_assert_eq!(i128::from(value.rounded()), rounded);
+            let tenth = NANO / 10;
+            let whole = nano % tenth == 0 && (0..10_000 * tenth).contains(&nano);
+            prop_assert_eq!(value.tenths().is_some(), whole);
+        }
+
+        #[test]
+        fn tenths_read_back(tenths in 0..10_000_u16) {
+            let value = Decimal::from_nano(i64::from(tenths) * (NANO / 10));
+            prop_assert_eq!(value.tenths(), Some(tenths));
         }
 
         #[test]
