@@ -200,7 +200,7 @@ fn every_wrong_line_has_its_code() {
         (RAPID, "C1440.1", 61),
         (RAPID, "G91 X4090", 61),
         (RAPID, "G20 X161.3", 61),
-        (RAPID, "G55 X4090", 61),
+        (&["G10 L2 P2 X10", "G0 X10 Y0"], "G55 X4090", 61),
         (RAPID, "G10 L2 P2 X4096", 61),
         (RAPID, "G10 L20 P2 X-4090", 61),
         (RAPID, "G92 X-4090", 61),

@@ -11,8 +11,9 @@ use core::hint::black_box;
 use firmware::board::{self, Console, Counter, Stopwatch};
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::corner::{self, Side};
-use planner_core::motion::{DelayLines, Motion, MotionState, Order};
-use planner_core::planner::{Accepted, Planner};
+use planner_core::gcode::{Defaults, Interpreter, Line};
+use planner_core::motion::{DelayLines, Motion, MotionState};
+use planner_core::planner::Planner;
 use planner_core::prefilter::{Kind, PrefilterConfig};
 use planner_core::raw::SegmentQueue;
 use static_cell::ConstStaticCell;
@@ -46,6 +47,14 @@ fn main() -> ! {
                 round = black_box(round + 1);
             }
         });
+    }
+    for (name, text) in [
+        ("gcode/line", "G1 X123.456 Y78.901"),
+        ("gcode/feed", "N10 G1 X123.4 Y7.8 F9600"),
+        ("gcode/arc", "G2 X4 Y4 I-4 J7"),
+    ] {
+        let worst = bench.interpret(text);
+        bench.print(format_args!("{name}"), worst);
     }
     let filters = FILTERS.take();
     for (program, text) in PROGRAMS {
@@ -127,11 +136,11 @@ impl Bench {
                 let mut accepted = None;
                 let cost = self.count(|| accepted = planner.line(black_box(line).as_bytes()).ok());
                 worst.line = worst.line.max(cost);
-                match defmt::unwrap!(accepted, "the program is right") {
-                    Accepted::Reference(pose) => motion.obey(Order::Place(pose)),
-                    Accepted::End => more = false,
-                    Accepted::Nothing | Accepted::Queued => {}
+                let accepted = defmt::unwrap!(accepted, "the program is right");
+                if let Some(pose) = accepted.reference {
+                    motion.place(pose);
                 }
+                more = !accepted.ended;
             }
             motion.obey(Order::Start);
             let mut state = MotionState::Idle;
@@ -141,6 +150,24 @@ impl Bench {
                 return worst;
             }
         }
+    }
+
+    /// From the text of a line to its command, without the planner.
+    fn interpret(&self, text: &str) -> u32 {
+        let mut interpreter = Interpreter::new(Defaults::default());
+        let mut execute = |text: &str| {
+            let line = Line::parse(black_box(text).as_bytes())?;
+            let interpreted = interpreter.interpret(&line)?;
+            interpreter.commit(&interpreted);
+            black_box(&interpreted.command);
+            Ok::<_, planner_core::gcode::Error>(())
+        };
+        defmt::assert!(execute("G0 X10 Y10").is_ok());
+        defmt::assert!(execute("G1 X1 Y1 F600").is_ok());
+        let mut is_right = false;
+        let cost = self.count(|| is_right = execute(text).is_ok());
+        defmt::assert!(is_right, "the line is right");
+        cost
     }
 
     /// The dearest corner over angles, feedrates, tolerances, lines and arcs.

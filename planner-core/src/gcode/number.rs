@@ -172,7 +172,7 @@ impl Decimal {
             return None;
         }
         let odd = (self.nano >> 8) as u32;
-        if odd % ODD == 0 {
+        if odd.is_multiple_of(ODD) {
             Some((odd / ODD) as u16)
         } else {
             None
@@ -332,8 +332,8 @@ const fn divide<const D: u32>(numerator: u64) -> (u64, bool) {
     let mut low = numerator as u32;
     let mut digits = 4;
     while digits > 0 {
-        let part = remainder << 8 | low >> 24;
-        low_quotient = low_quotient << 8 | part / D;
+        let part = (remainder << 8) | (low >> 24);
+        low_quotient = (low_quotient << 8) | (part / D);
         remainder = part % D;
         low <<= 8;
         digits -= 1;
