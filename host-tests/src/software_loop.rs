@@ -3,7 +3,7 @@
 use std::fmt;
 
 use planner_core::config::Robot;
-use planner_core::motion::{DelayLines, Motion, MotionState, Setpoint};
+use planner_core::motion::{DelayLines, Motion, MotionState, Order, Setpoint};
 use planner_core::planner::{LineError, Planner};
 use planner_core::raw::SegmentQueue;
 
@@ -116,7 +116,7 @@ impl<'q> Controller<'q> {
                 };
                 let accepted = self.planner.line(line.as_bytes())?;
                 if let Some(pose) = accepted.reference {
-                    self.motion.place(pose);
+                    self.motion.obey(Order::Place(pose));
                 }
                 more = !accepted.ended;
             }

@@ -212,6 +212,29 @@ impl<'q> Planner<'q> {
         checked.map(drop).map_err(|cause| LineError { line, cause })
     }
 
+    /// Whether the line would be accepted now; changes nothing but the count of refusals.
+    ///
+    /// # Errors
+    /// [`LineError`] says what is wrong with it and what to do.
+    pub fn would_accept(&mut self, line: &Line) -> Result<(), LineError> {
+        let interpreted = self.interpreter.interpret(line);
+        let interpreted = interpreted.map_err(|error| self.refused(error))?;
+        let checked = self.durations_s(&interpreted.command);
+        checked.map(drop).map_err(|cause| self.refusal(cause))
+    }
+
+    /// The robot that planning uses.
+    #[must_use]
+    pub const fn robot(&self) -> &Robot {
+        &self.robot
+    }
+
+    /// Goes on from where the motion has been stopped, the queue being empty.
+    pub fn stopped_at(&mut self, pose: Pose) {
+        self.interpreter.set_position(Some(pose));
+        self.schedule.reset();
+    }
+
     /// Counts a line that could not be read.
     pub fn refused(&mut self, error: gcode::Error) -> LineError {
         self.refusal(Cause::Gcode(error))

@@ -12,7 +12,7 @@ use firmware::board::{self, Console, Counter, Stopwatch};
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::corner::{self, Side};
 use planner_core::gcode::{Defaults, Interpreter, Line};
-use planner_core::motion::{DelayLines, Motion, MotionState};
+use planner_core::motion::{DelayLines, Motion, MotionState, Order};
 use planner_core::planner::Planner;
 use planner_core::prefilter::{Kind, PrefilterConfig};
 use planner_core::raw::SegmentQueue;
@@ -138,7 +138,7 @@ impl Bench {
                 worst.line = worst.line.max(cost);
                 let accepted = defmt::unwrap!(accepted, "the program is right");
                 if let Some(pose) = accepted.reference {
-                    motion.place(pose);
+                    motion.obey(Order::Place(pose));
                 }
                 more = !accepted.ended;
             }

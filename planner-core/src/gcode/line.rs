@@ -39,8 +39,9 @@ pub struct Line {
 impl Line {
     /// Reads one line, given without its line end. No words is a line, too.
     ///
-    /// A `*` and a number end the words: the checksum, which is the exclusive or of
-    /// all bytes before the `*` (RepRap's convention), is verified. One flipped bit makes
+    /// A `*` and a number end the words: the checksum of all bytes before the `*`, which is
+    /// verified. It is their exclusive or (RepRap's convention), or in five digits their
+    /// [`crc16`], which also finds what two faults leave of a line. One flipped bit makes
     /// `*` the begin of a comment, so a link that relies on checksums has to insist on
     /// [`Line::has_checksum`].
     ///
@@ -116,55 +117,13 @@ impl Line {
             .map_err(|_| Error::TooManyWords)
     }
 
-    /// The values of the words, in their order.
-    pub(super) fn values(&self) -> &[Decimal] {
-        &self.values
-    }
-
-    /// Whether it carried a checksum, and so the right one.
-    #[must_use]
-    pub const fn has_checksum(&self) -> bool {
-        self.has_checksum
-    }
-
-    /// The N word, or the last one if there are several; decimals are cut off. It may be
-    /// negative in a line that sets the number.
-    #[must_use]
-    pub fn number(&self) -> Option<i32> {
-        let word = self.words().rev().find(|word| word.letter == b'N')?;
-        i32::try_from(word.value.integer()).ok()
-    }
-
-    /// Whether it does nothing but set the line number: `M110 N7`, or as some senders say
-    /// it, `N-1 M110 N-1`. The next line has the number that follows.
-    #[must_use]
-    pub fn sets_number(&self) -> bool {
-        let m110 = Word {
-            letter: b'M',
-            value: Decimal::from_integer(110),
-        };
-        let mut is_set = false;
-        self.words().all(|word| {
-            is_set |= word == m110;
-            word.letter == b'N' || word == m110
-        }) && is_set
-    }
-
-    fn push(&mut self, word: Word) -> Result<(), Error> {
-        let letter = self.letters.push(word.letter);
-        letter.map_err(|_| Error::TooManyWords)?;
-        self.values
-            .push(word.value)
-            .map_err(|_| Error::TooManyWords)
-    }
-
     /// Reads characters that all mean something; a checksum among them is that of `covered`.
     fn parse_compact(mut text: &[u8], covered: &[u8]) -> Result<Self, Error> {
         let mut line = Self::default();
         while let [letter, after @ ..] = text {
             match *letter {
                 b'*' => {
-                    verify_checksum(after, checksum)?;
+                    verify_checksum(after, covered)?;
                     line.has_checksum = true;
                     break;
                 }

@@ -35,7 +35,7 @@ pub use command::{
 };
 pub use error::Error;
 pub use interpreter::{Interpreted, Interpreter};
-pub use line::{Line, MAX_WORDS, Word};
+pub use line::{Line, MAX_WORDS, Word, crc16};
 pub use modal::{Coolant, Defaults, Distance, FeedMode, Modal, Motion, Plane, Spindle, Units};
 pub use number::{Decimal, NumberError};
 pub use offsets::{Offsets, WORK_SYSTEMS};
