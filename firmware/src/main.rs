@@ -3,7 +3,9 @@
 #![no_main]
 
 use embassy_executor::Executor;
-use firmware::board::{self, Board, BoardWatchdog, CommandIn, CommandOut, Counter, SetpointOut};
+use firmware::board::{
+    self, Board, BoardOutputs, BoardWatchdog, CommandIn, CommandOut, Counter, SetpointOut,
+};
 use firmware::tasks::command::{Commands, Received};
 use firmware::tasks::control::Frames;
 use firmware::tasks::link::Link;
@@ -40,6 +42,7 @@ fn start() -> Commands<CommandIn, CommandOut> {
         command_in,
         command_out,
         setpoint_out,
+        outputs,
         watchdog,
         stopwatch,
         control,
@@ -56,7 +59,7 @@ fn start() -> Commands<CommandIn, CommandOut> {
     let planner = PLANNER.init_with(|| Planner::new(robot, to_motion));
 
     control.spawn(defmt::unwrap!(control_task(
-        motion, link, frames, stopwatch, watchdog
+        motion, link, frames, outputs, stopwatch, watchdog
     )));
     setpoints.spawn(defmt::unwrap!(setpoint_task(frames, setpoint_out)));
     Commands {
@@ -76,10 +79,11 @@ async fn control_task(
     motion: Motion<'static>,
     link: &'static Link,
     frames: &'static Frames,
+    outputs: BoardOutputs,
     stopwatch: Counter,
     watchdog: BoardWatchdog,
 ) {
-    control::run(motion, link, frames, stopwatch, watchdog).await
+    control::run(motion, link, frames, outputs, stopwatch, watchdog).await
 }
 
 #[embassy_executor::task]

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use planner_core::config::Robot;
-use planner_core::motion::{DelayLines, Motion, MotionState, Setpoint};
+use planner_core::motion::{DelayLines, Motion, MotionState, Order, Setpoint};
 use planner_core::planner::{Accepted, LineError, Planner};
 use planner_core::raw::SegmentQueue;
 
@@ -111,13 +111,13 @@ impl<'q> Controller<'q> {
         loop {
             while more && self.planner.has_room() {
                 match lines.next().map(|line| self.planner.line(line.as_bytes())) {
-                    Some(Ok(Accepted::Reference(pose))) => self.motion.place(pose),
+                    Some(Ok(Accepted::Reference(pose))) => self.motion.obey(Order::Place(pose)),
                     Some(Ok(Accepted::End)) | None => more = false,
                     Some(Ok(Accepted::Nothing | Accepted::Queued)) => {}
                     Some(Err(error)) => return Err(error),
                 }
             }
-            self.motion.start();
+            self.motion.obey(Order::Start);
             let setpoint = self.motion.tick();
             each(&setpoint);
             if setpoint.state == MotionState::Idle && !more {

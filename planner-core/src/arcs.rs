@@ -42,6 +42,11 @@ enum Phase {
 }
 
 impl Arcs {
+    /// Forgets them, when their bows are part of the point at which everything stands.
+    pub fn clear(&mut self) {
+        *self = Self::default();
+    }
+
     /// Whether another arc may begin.
     pub fn has_room(&self) -> bool {
         self.channels

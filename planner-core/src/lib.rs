@@ -15,6 +15,7 @@ pub mod path;
 pub mod planner;
 pub mod pose;
 pub mod prefilter;
+mod rate;
 pub mod raw;
 mod schedule;
 pub mod telemetry;

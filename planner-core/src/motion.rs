@@ -13,11 +13,42 @@ use crate::walker::Walker;
 /// Whether the robot moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MotionState {
-    /// Everything stands; queued segments wait for [`Motion::start`].
+    /// Everything stands; what is queued waits for [`Order::Start`].
     #[default]
     Idle,
     /// The raw path or what the prefilter still holds of it moves the robot.
     Running,
+    /// The raw path has been stopped, by [`Order::Hold`] or [`Order::Stop`]; the prefilter
+    /// settles.
+    Stopping,
+    /// Everything stands on the path; [`Order::Resume`] goes on.
+    Held,
+    /// The same, because the program said so (M0).
+    Paused,
+}
+
+/// What may be asked of the motion, at any time. An order that makes no sense in the state of
+/// the moment has no effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// The tool is here. Only while everything stands and nothing is under way.
+    Place(Pose),
+    /// Execute what is queued, if anything is; the robot goes idle when the queue runs dry and
+    /// everything stands.
+    Start,
+    /// Stop on the path as soon as possible.
+    Hold,
+    /// Go on from a hold or a pause; otherwise as [`Order::Start`].
+    Resume,
+    /// Stop on the path as soon as possible, then forget what is queued and go idle.
+    Stop,
+    /// Go faster or slower from now on.
+    Rates {
+        /// Part of the programmed feedrates, 10 to 200 %.
+        feed_percent: u16,
+        /// Part of the rapid's feedrate, up to 100 %.
+        rapid_percent: u8,
+    },
 }
 
 /// What a tick yields.
@@ -29,6 +60,8 @@ pub struct Setpoint {
     pub joints: JointState,
     /// Whether the robot moves.
     pub state: MotionState,
+    /// The digital outputs: bit 0 the gripper, bit 1 the blow-off.
+    pub outputs: u8,
 }
 
 /// The delay lines of the filters: most of the core's memory, 25 KiB, apart from [`Motion`] so
@@ -67,10 +100,34 @@ pub struct Motion<'q> {
     arcs: Arcs,
     /// Commands of the last two ticks in 2^-32 mm, oldest first.
     history: [[i64; AXES]; 2],
-    state: MotionState,
-    /// Ticks since the raw path ended.
-    done_for: u16,
+    mode: Mode,
+    /// Ticks since the raw path last moved.
+    stood_for: u16,
+    outputs: u8,
 }
+
+/// What the motion is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    /// Nothing. To running by a start.
+    Idle,
+    /// Walking the raw path. To idle when the queue has run dry and everything stands, to
+    /// paused when the path says so, to stopping by a hold or a stop.
+    Running,
+    /// The raw path is held, the filters settle. Then to held, or to forgetting if it is a
+    /// stop; back to running by a resume.
+    Stopping { forget: bool },
+    /// Everything stands, on the path. To running by a resume.
+    Held,
+    /// Likewise.
+    Paused,
+    /// Everything stands, and the queue is being emptied. Then to idle.
+    Forgetting,
+}
+
+/// Queued segments that a tick forgets after a stop: so few that it costs less than a tick of
+/// motion.
+const FORGOTTEN_A_TICK: usize = 8;
 
 impl<'q> Motion<'q> {
     /// At rest at the origin of the robot's frame.
@@ -85,47 +142,89 @@ impl<'q> Motion<'q> {
             filters,
             arcs: Arcs::default(),
             history: [[0; AXES]; 2],
-            state: MotionState::Idle,
-            done_for: 0,
+            mode: Mode::Idle,
+            stood_for: u16::MAX,
+            outputs: 0,
         }
     }
 
-    /// Takes the tool to be at `pose`. Only while idle; otherwise nothing happens.
-    pub fn place(&mut self, pose: Pose) {
-        if self.state == MotionState::Idle {
-            let point = pose.to_bits();
-            self.walker.place(point);
-            self.filters.lines.reset(point);
-            self.history = [point.map(|value| i64::from(value) << FINE_BITS); 2];
+    /// Does what is asked, from this tick on.
+    pub fn obey(&mut self, order: Order) {
+        match order {
+            Order::Place(pose) => self.place(pose),
+            Order::Start => self.start(),
+            Order::Hold => self.hold(),
+            Order::Resume => self.resume(),
+            Order::Stop => self.stop(),
+            Order::Rates {
+                feed_percent: _,
+                rapid_percent: _,
+            } => {}
         }
     }
 
     /// Changes the robot's settings. Only while idle; otherwise nothing happens.
     pub fn set_robot(&mut self, robot: &Robot) {
-        if self.state == MotionState::Idle {
+        if self.mode == Mode::Idle {
             self.kernel = robot.kernel.clone();
             self.kinematics = robot.scara.clone();
-            let [_, rest] = self.history;
-            self.filters
-                .lines
-                .reset(rest.map(|value| (value >> FINE_BITS) as i32));
+            self.rest_at(self.nearest_point());
         }
     }
 
-    /// Begins to execute what is queued, if anything is; the robot goes idle when the queue
-    /// runs dry and everything stands.
-    pub fn start(&mut self) {
-        if !self.walker.is_done() {
-            self.state = MotionState::Running;
+    fn place(&mut self, pose: Pose) {
+        let stands = match self.mode {
+            Mode::Idle => true,
+            Mode::Held | Mode::Paused => self.walker.is_done(),
+            Mode::Running | Mode::Stopping { .. } | Mode::Forgetting => false,
+        };
+        if stands {
+            self.rest_at(pose.to_bits());
+        }
+    }
+
+    fn start(&mut self) {
+        if self.mode == Mode::Idle && !self.walker.is_done() {
+            self.mode = Mode::Running;
+        }
+    }
+
+    fn hold(&mut self) {
+        match self.mode {
+            Mode::Idle => self.mode = Mode::Held,
+            Mode::Running => self.mode = Mode::Stopping { forget: false },
+            Mode::Stopping { .. } | Mode::Held | Mode::Paused | Mode::Forgetting => {}
+        }
+    }
+
+    fn resume(&mut self) {
+        match self.mode {
+            Mode::Stopping { forget: false } | Mode::Held | Mode::Paused => {
+                self.mode = Mode::Running;
+            }
+            Mode::Idle | Mode::Running | Mode::Stopping { .. } | Mode::Forgetting => self.start(),
+        }
+    }
+
+    fn stop(&mut self) {
+        match self.mode {
+            Mode::Running | Mode::Stopping { .. } => self.mode = Mode::Stopping { forget: true },
+            Mode::Idle | Mode::Held | Mode::Paused | Mode::Forgetting => self.forget(),
         }
     }
 
     /// The setpoint of this tick.
     #[must_use]
     pub fn tick(&mut self) -> Setpoint {
-        let newest = match self.state {
-            MotionState::Idle => self.history[1],
-            MotionState::Running => self.command(),
+        let newest = match self.mode {
+            Mode::Running | Mode::Stopping { .. } => self.command(),
+            Mode::Idle | Mode::Held | Mode::Paused => self.history[1],
+            Mode::Forgetting => {
+                if self.walker.forget(FORGOTTEN_A_TICK) {
+                    self.mode = Mode::Idle;
+                }
+                self.history[1]
+            }
         };
         let [before, now] = self.history;
         self.history = [now, newest];
@@ -137,7 +236,8 @@ impl<'q> Motion<'q> {
         Setpoint {
             pose,
             joints: self.kinematics.joint_state(&pose, velocity, acceleration),
-            state: self.state,
+            state: self.state(),
+            outputs: self.outputs,
         }
     }
 
@@ -145,24 +245,74 @@ impl<'q> Motion<'q> {
     /// although more may be on its way.
     #[must_use]
     pub fn is_out_of_path(&self) -> bool {
-        self.state == MotionState::Running && self.walker.is_done()
+        self.mode == Mode::Running && self.walker.is_done()
+    }
+
+    /// Whether nothing is queued or under way.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.walker.is_done()
+    }
+
+    fn state(&self) -> MotionState {
+        match self.mode {
+            Mode::Idle => MotionState::Idle,
+            Mode::Running => MotionState::Running,
+            Mode::Stopping { .. } | Mode::Forgetting => MotionState::Stopping,
+            Mode::Held => MotionState::Held,
+            Mode::Paused => MotionState::Paused,
+        }
     }
 
     /// The newest command in 2^-32 mm: one tick of the raw path, filtered.
     fn command(&mut self) -> [i64; AXES] {
+        self.walker.hold(self.mode != Mode::Running);
         let raw = self.walker.step(self.arcs.has_room());
         let [x, y, z, c] = self.filters.lines.process(&self.kernel, raw.chord);
         let [bow_x, bow_y] = self.arcs.step(&mut self.filters.arcs, &self.kernel, &raw);
-        if self.walker.is_done() {
-            self.done_for = self.done_for.saturating_add(1);
-            // the filters and then the two ticks of history have settled
-            if self.done_for > self.kernel.length_ticks() + 2 {
-                self.state = MotionState::Idle;
-            }
+        let newest = [x.wrapping_add(bow_x), y.wrapping_add(bow_y), z, c];
+        self.stood_for = if raw.moves {
+            0
         } else {
-            self.done_for = 0;
+            self.stood_for.saturating_add(1)
+        };
+        // the filters and then the two ticks of history have settled
+        if self.stood_for > self.kernel.length_ticks() + 2 {
+            self.settled();
+            return self.history[1];
         }
-        [x.wrapping_add(bow_x), y.wrapping_add(bow_y), z, c]
+        newest
+    }
+
+    /// Everything has come to rest.
+    fn settled(&mut self) {
+        match self.mode {
+            Mode::Running if self.walker.is_done() => self.mode = Mode::Idle,
+            Mode::Stopping { forget: false } => self.mode = Mode::Held,
+            Mode::Stopping { forget: true } => self.forget(),
+            Mode::Idle | Mode::Running | Mode::Held | Mode::Paused | Mode::Forgetting => {}
+        }
+    }
+
+    /// Stays where everything stands, and begins to empty the queue.
+    fn forget(&mut self) {
+        self.rest_at(self.nearest_point());
+        self.mode = Mode::Forgetting;
+    }
+
+    /// The command at rest as a pose can tell it. Between the ends of an arc that is not exact.
+    fn nearest_point(&self) -> [i32; AXES] {
+        let [_, rest] = self.history;
+        rest.map(|value| round_off(value) as i32)
+    }
+
+    /// Puts everything to rest at a point.
+    fn rest_at(&mut self, point: [i32; AXES]) {
+        self.walker.place(point);
+        self.filters.lines.reset(point);
+        self.arcs.clear();
+        self.history = [point.map(|value| i64::from(value) << FINE_BITS); 2];
+        self.stood_for = u16::MAX;
     }
 }
 

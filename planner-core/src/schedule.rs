@@ -123,7 +123,7 @@ impl<'q> Schedule<'q> {
     ///
     /// `false` if the look-ahead is full.
     pub fn dwell(&mut self, robot: &Robot, pose: Pose, duration_s: f64) -> bool {
-        let settle = robot.kernel.stop_time(self.since_tick);
+        let settle = robot.kernel.stop_time((ONE_TICK - self.since_tick) % ONE_TICK);
         self.previous = None;
         self.blends.clear();
         self.push(RawSegment::stand_still(
@@ -157,7 +157,7 @@ impl<'q> Schedule<'q> {
         let mut dwell = if corner.cornering_s > 0.0 {
             settled - tick_time(f64::from(corner.cornering_s)).min(settled)
         } else {
-            robot.kernel.stop_time(self.since_tick)
+            robot.kernel.stop_time((ONE_TICK - self.since_tick) % ONE_TICK)
         };
         let turn = turn(arriving, leaving);
         let own = Blend {

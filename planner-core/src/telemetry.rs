@@ -1,27 +1,28 @@
 //! The setpoint stream: one frame a control tick, from the controller to the drives.
 //!
-//! A frame is 77 bytes, little endian, followed by their CRC-32 (ISO-HDLC), the
-//! whole COBS-coded and closed by a zero byte: 83 bytes on the wire, 830 kBd at
+//! A frame is 78 bytes, little endian, followed by their CRC-32 (ISO-HDLC), the
+//! whole COBS-coded and closed by a zero byte: 84 bytes on the wire, 840 kBd at
 //! 1 kHz. A receiver that starts in the middle, or that loses bytes, is in step
 //! again at the next zero.
 //!
 //! | offset | field | |
 //! |---|---|---|
 //! | 0 | sequence | u32, one more each tick |
-//! | 4 | state | u8, 0 idle, 1 running |
+//! | 4 | state | u8, 0 idle, 1 running, 2 stopping, 3 held, 4 paused |
 //! | 5 | pose | 4 × i32, raw bits of X, Y, Z (2^-19 mm) and C (2^-19 °) |
 //! | 21 | joint position | 4 × i32, raw bits (2^-26 rad; joint 3 2^-19 mm) |
 //! | 37 | joint velocity | 4 × f32, rad/s and mm/s |
 //! | 53 | joint acceleration | 4 × f32, rad/s² and mm/s² |
 //! | 69 | tick cost | u32, instructions or cycles of this tick, as the board counts |
 //! | 73 | overruns | u32, control periods missed since the start |
+//! | 77 | outputs | u8, bit 0 gripper, bit 1 blow-off |
 
 use crate::motion::{MotionState, Setpoint};
 use crate::pose::{AXES, JointPosition, JointState, Pose};
 use crate::units::{AngleRad, LengthMm};
 
 /// Bytes of a frame before the CRC.
-const BODY_BYTES: usize = 77;
+const BODY_BYTES: usize = 78;
 
 /// Bytes of a frame with its CRC, before COBS.
 const CHECKED_BYTES: usize = BODY_BYTES + 4;
@@ -75,6 +76,7 @@ impl SetpointFrame {
         }
         put(&mut rest, self.tick_cost.to_le_bytes());
         put(&mut rest, self.overruns.to_le_bytes());
+        put(&mut rest, [self.setpoint.outputs]);
         body
     }
 
@@ -88,6 +90,9 @@ impl SetpointFrame {
         let position = core::array::from_fn(|_| i32::from_le_bytes(take(&mut rest)));
         let velocity = core::array::from_fn(|_| f32::from_le_bytes(take(&mut rest)));
         let acceleration = core::array::from_fn(|_| f32::from_le_bytes(take(&mut rest)));
+        let tick_cost = u32::from_le_bytes(take(&mut rest));
+        let overruns = u32::from_le_bytes(take(&mut rest));
+        let [outputs] = take(&mut rest);
         Some(Self {
             sequence,
             setpoint: Setpoint {
@@ -98,9 +103,10 @@ impl SetpointFrame {
                     acceleration,
                 },
                 state: state_from_byte(state)?,
+                outputs,
             },
-            tick_cost: u32::from_le_bytes(take(&mut rest)),
-            overruns: u32::from_le_bytes(take(&mut rest)),
+            tick_cost,
+            overruns,
         })
     }
 }
@@ -128,6 +134,9 @@ fn state_to_byte(state: MotionState) -> u8 {
     match state {
         MotionState::Idle => 0,
         MotionState::Running => 1,
+        MotionState::Stopping => 2,
+        MotionState::Held => 3,
+        MotionState::Paused => 4,
     }
 }
 
@@ -135,6 +144,9 @@ fn state_from_byte(byte: u8) -> Option<MotionState> {
     match byte {
         0 => Some(MotionState::Idle),
         1 => Some(MotionState::Running),
+        2 => Some(MotionState::Stopping),
+        3 => Some(MotionState::Held),
+        4 => Some(MotionState::Paused),
         _ => None,
     }
 }
@@ -257,6 +269,7 @@ mod tests {
                     acceleration: [-1e9, 0.25, 0.0, 3.0],
                 },
                 state: MotionState::Running,
+                outputs: 2,
             },
             tick_cost: 1999,
             overruns: 3,
@@ -272,21 +285,21 @@ mod tests {
         assert_eq!(body[21..25], [0xFF, 0xFF, 0xFF, 0x7F]);
         assert_eq!(body[41..45], [0, 0, 0, 0x80]);
         assert_eq!(body[45..49], [0, 0, 0xC0, 0x3F]);
-        assert_eq!(body[69..], [0xCF, 7, 0, 0, 3, 0, 0, 0]);
+        assert_eq!(body[69..], [0xCF, 7, 0, 0, 3, 0, 0, 0, 2]);
         let wire = SetpointFrame::default().encode();
-        assert_eq!(wire.len(), 83);
-        // 77 zeros are 77 codes of 1; then the CRC behind its code, and the end.
-        assert!(wire[..77].iter().all(|&code| code == 1));
+        assert_eq!(wire.len(), 84);
+        // 78 zeros are 78 codes of 1; then the CRC behind its code, and the end.
+        assert!(wire[..78].iter().all(|&code| code == 1));
         let crc = CRC.checksum(&[0; BODY_BYTES]).to_le_bytes();
-        assert_eq!(wire[77], 5);
-        assert_eq!(wire[78..82], crc);
-        assert_eq!(wire[82], 0);
+        assert_eq!(wire[78], 5);
+        assert_eq!(wire[79..83], crc);
+        assert_eq!(wire[83], 0);
     }
 
     #[test]
     fn a_stream_arrives_whole_in_pieces_of_any_size() {
         let wire: Vec<u8> = (0..50).flat_map(|n| frame(n).encode()).collect();
-        for piece in [1, 2, 7, 83, 100, wire.len()] {
+        for piece in [1, 2, 7, FRAME_BYTES, 100, wire.len()] {
             let mut decoder = FrameDecoder::new();
             let mut seen = Vec::new();
             for bytes in wire.chunks(piece) {
@@ -330,7 +343,7 @@ mod tests {
         #[test]
         fn every_frame_survives(
             sequence: u32, pose: [i32; 4], position: [i32; 4], velocity: [u32; 4],
-            acceleration: [u32; 4], tick_cost: u32, overruns: u32, running: bool,
+            acceleration: [u32; 4], tick_cost: u32, overruns: u32, state: u8, outputs: u8,
         ) {
             let sent = SetpointFrame {
                 sequence,
@@ -341,7 +354,8 @@ mod tests {
                         velocity: velocity.map(f32::from_bits),
                         acceleration: acceleration.map(f32::from_bits),
                     },
-                    state: if running { MotionState::Running } else { MotionState::Idle },
+                    state: state_from_byte(state % 5).unwrap(),
+                    outputs,
                 },
                 tick_cost,
                 overruns,
@@ -359,7 +373,7 @@ mod tests {
         /// order, and in step again after the next end.
         #[test]
         fn damage_never_makes_a_frame(
-            damage in proptest::collection::vec((0_usize..83 * 20, 0_u8..3, any::<u8>()), 0..12),
+            damage in proptest::collection::vec((0_usize..FRAME_BYTES * 20, 0_u8..3, any::<u8>()), 0..12),
         ) {
             let mut wire: Vec<u8> = (0..20).flat_map(|n| frame(n).encode()).collect();
             for (at, kind, byte) in damage {

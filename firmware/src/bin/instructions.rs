@@ -11,7 +11,7 @@ use core::hint::black_box;
 use firmware::board::{self, Console, Counter, Stopwatch};
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::corner::{self, Side};
-use planner_core::motion::{DelayLines, Motion, MotionState};
+use planner_core::motion::{DelayLines, Motion, MotionState, Order};
 use planner_core::planner::{Accepted, Planner};
 use planner_core::prefilter::{Kind, PrefilterConfig};
 use planner_core::raw::SegmentQueue;
@@ -128,12 +128,12 @@ impl Bench {
                 let cost = self.count(|| accepted = planner.line(black_box(line).as_bytes()).ok());
                 worst.line = worst.line.max(cost);
                 match defmt::unwrap!(accepted, "the program is right") {
-                    Accepted::Reference(pose) => motion.place(pose),
+                    Accepted::Reference(pose) => motion.obey(Order::Place(pose)),
                     Accepted::End => more = false,
                     Accepted::Nothing | Accepted::Queued => {}
                 }
             }
-            motion.start();
+            motion.obey(Order::Start);
             let mut state = MotionState::Idle;
             let cost = self.count(|| state = motion.tick().state);
             worst.tick = worst.tick.max(cost);

@@ -28,13 +28,15 @@ compile_error!("choose one board: `nucleo-g474re` is the default, so add --no-de
 compile_error!("choose a board: feature `nucleo-g474re` or `mps2-an386`");
 
 /// What a board gives the tasks.
-pub struct Board<I, O, S, W, T> {
+pub struct Board<I, O, S, D, W, T> {
     /// Commands come in here.
     pub command_in: I,
     /// Answers go out here.
     pub command_out: O,
     /// Setpoints go out here.
     pub setpoint_out: S,
+    /// Drives the gripper and the blow-off.
+    pub outputs: D,
     /// Resets the board when the control task does not keep up.
     pub watchdog: W,
     /// Measures the tick.
@@ -56,6 +58,12 @@ pub trait ByteIn {
 pub trait ByteOut {
     /// Sends all `bytes`.
     fn write_all(&mut self, bytes: &[u8]) -> impl Future<Output = ()>;
+}
+
+/// The digital outputs.
+pub trait Outputs {
+    /// Switches all of them: bit 0 the gripper, bit 1 the blow-off.
+    fn set(&mut self, bits: u8);
 }
 
 /// The board's watchdog, running since the start.

@@ -25,7 +25,7 @@ use embassy_time::Timer;
 use embassy_time_queue_utils::Queue;
 use heapless::Deque;
 
-use super::{Board, ByteIn, ByteOut, Stopwatch, WATCHDOG_MS, Watchdog};
+use super::{Board, ByteIn, ByteOut, Outputs, Stopwatch, WATCHDOG_MS, Watchdog};
 
 const CORE_HZ: u32 = 25_000_000;
 
@@ -36,7 +36,7 @@ const SYSTICK_HZ: u32 = 1000;
 const TIME_PER_SYSTICK: u64 = embassy_time::TICK_HZ / SYSTICK_HZ as u64;
 
 /// The emulated board's parts.
-pub type Parts = Board<CommandIn, CommandOut, SetpointOut, BoardWatchdog, Counter>;
+pub type Parts = Board<CommandIn, CommandOut, SetpointOut, BoardOutputs, BoardWatchdog, Counter>;
 
 /// A memory-mapped register.
 #[derive(Clone, Copy)]
@@ -161,6 +161,7 @@ pub fn start() -> Parts {
         command_in: CommandIn(()),
         command_out: UartOut(Uart::COMMANDS),
         setpoint_out: UartOut(Uart::SETPOINTS),
+        outputs: BoardOutputs(()),
         watchdog: BoardWatchdog::start(),
         stopwatch: Counter::start(),
         control: CONTROL.start(Interrupt::Control),
@@ -282,6 +283,19 @@ impl ByteOut for UartOut {
             }
             self.0.data().write(byte.into());
         }
+    }
+}
+
+/// The board's two LEDs, in its system registers; they stand for the outputs.
+pub struct BoardOutputs(());
+
+impl BoardOutputs {
+    const LEDS: Register = Register(0x4002_8000);
+}
+
+impl Outputs for BoardOutputs {
+    fn set(&mut self, bits: u8) {
+        Self::LEDS.write(bits.into());
     }
 }
 

@@ -4,12 +4,14 @@
 //! |---|---|
 //! | commands | LPUART1, PA2 / PA3: the ST-LINK's virtual serial port, 115200 Bd |
 //! | setpoints | USART1 TX on PC4 (Arduino D1), 2 MBd |
+//! | outputs | gripper PA5 (Arduino D13, LED LD2), blow-off PA6 (D12); high is on |
 //! | clock | HSE 24 MHz, PLL ÷ 6 × 85 ÷ 2 |
 #![allow(unsafe_code, reason = "interrupt handlers call their executors")]
 
 use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
 use embassy_executor::InterruptExecutor;
+use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::{DMA1_CH1, IWDG, LPUART1};
@@ -21,14 +23,14 @@ use embedded_io_async::{Read, Write};
 use panic_probe as _;
 use static_cell::ConstStaticCell;
 
-use super::{Board, ByteIn, ByteOut, Stopwatch, WATCHDOG_MS, Watchdog};
+use super::{Board, ByteIn, ByteOut, Outputs, Stopwatch, WATCHDOG_MS, Watchdog};
 
 /// The real board's parts.
-pub type Parts = Board<CommandIn, CommandOut, SetpointOut, BoardWatchdog, Counter>;
+pub type Parts = Board<CommandIn, CommandOut, SetpointOut, BoardOutputs, BoardWatchdog, Counter>;
 
 const COMMAND_BAUD: u32 = 115_200;
 
-/// A frame is 83 bytes of 10 bits, so 1 kHz takes 830 kBd; 170 MHz / 85 is exact.
+/// A frame is 84 bytes of 10 bits, so 1 kHz takes 840 kBd; 170 MHz / 85 is exact.
 const SETPOINT_BAUD: u32 = 2_000_000;
 
 /// The command task may be planning while bytes arrive: 22 ms of them at 115200 Bd.
@@ -100,6 +102,10 @@ pub fn start() -> Parts {
         command_in: CommandIn(command_in),
         command_out: CommandOut(command_out),
         setpoint_out: SetpointOut(setpoints),
+        outputs: BoardOutputs {
+            gripper: Output::new(p.PA5, Level::Low, Speed::Low),
+            blow_off: Output::new(p.PA6, Level::Low, Speed::Low),
+        },
         watchdog: BoardWatchdog(watchdog),
         stopwatch: Counter::start(),
         control: CONTROL.start(interrupt::SAI1),
@@ -166,6 +172,19 @@ impl ByteOut for SetpointOut {
         if let Err(error) = self.0.write(bytes).await {
             defmt::warn!("setpoint port: {}", error);
         }
+    }
+}
+
+/// The pins of the digital outputs.
+pub struct BoardOutputs {
+    gripper: Output<'static>,
+    blow_off: Output<'static>,
+}
+
+impl Outputs for BoardOutputs {
+    fn set(&mut self, bits: u8) {
+        self.gripper.set_level((bits & 1 != 0).into());
+        self.blow_off.set_level((bits & 2 != 0).into());
     }
 }
 

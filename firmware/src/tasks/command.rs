@@ -9,7 +9,7 @@ use embassy_time::{Duration, Instant, Timer, with_deadline};
 use micromath::F32Ext;
 use planner_core::config::{ConfigError, Robot, RobotConfig, SettingError};
 use planner_core::gcode::{self, LineBuffer};
-use planner_core::motion::MotionState;
+use planner_core::motion::{self, MotionState};
 use planner_core::planner::{Accepted, Planner};
 use planner_core::pose::Pose;
 use planner_core::units::TICK_HZ;
@@ -121,7 +121,7 @@ impl<O: ByteOut> Session<O> {
             let now = Instant::now();
             let full = !self.planner.has_room();
             if self.cycle_start.is_due(now, full) {
-                self.order(Order::Start).await;
+                self.order(motion::Order::Start).await;
             }
             // A deadline that is now still takes what the port already has, so that
             // a question is answered between two lines.
@@ -158,6 +158,8 @@ impl<O: ByteOut> Session<O> {
         match realtime {
             Some(b'?') => self.say_status().await,
             Some(SOFT_RESET) => self.soft_reset().await,
+            Some(b'!') => self.order(motion::Order::Hold).await,
+            Some(b'~') => self.order(motion::Order::Resume).await,
             Some(_) => {}
             // A sender that keeps asking for the status says nothing about moves.
             None => self.cycle_start.heard(Instant::now()),
@@ -180,7 +182,7 @@ impl<O: ByteOut> Session<O> {
             Ok(accepted) => {
                 match accepted {
                     Accepted::Nothing => {}
-                    Accepted::Reference(pose) => self.order(Order::Place(pose)).await,
+                    Accepted::Reference(pose) => self.order(motion::Order::Place(pose)).await,
                     Accepted::Queued => {
                         self.link.set_program_open(true);
                         self.cycle_start.queued();
@@ -216,7 +218,7 @@ impl<O: ByteOut> Session<O> {
             return self.refuse(code::BAD_DOLLAR, reason).await;
         }
         if let Some(robot) = self.robot.take() {
-            self.order(Order::Robot(robot)).await;
+            self.link_order(Order::Robot(robot)).await;
             self.robot = Some(self.link.robot_back().await);
         }
         self.say_ok().await;
@@ -249,7 +251,11 @@ impl<O: ByteOut> Session<O> {
         }
     }
 
-    async fn order(&mut self, order: Order) {
+    async fn order(&mut self, order: motion::Order) {
+        self.link_order(Order::Motion(order)).await;
+    }
+
+    async fn link_order(&mut self, order: Order) {
         self.orders = self.orders.wrapping_add(1);
         self.link.order(order).await;
     }
@@ -264,7 +270,12 @@ impl<O: ByteOut> Session<O> {
 
     async fn say_status(&mut self) {
         let report = self.link.report();
-        let state = if self.is_at_rest() { "Idle" } else { "Run" };
+        let state = match report.setpoint.state {
+            MotionState::Idle if self.is_at_rest() => "Idle",
+            MotionState::Idle | MotionState::Running => "Run",
+            MotionState::Stopping => "Hold:1",
+            MotionState::Held | MotionState::Paused => "Hold:0",
+        };
         let Pose { x, y, z, c } = report.setpoint.pose;
         self.say(format_args!(
             "<{state}|MPos:{x:.3},{y:.3},{z:.3},{c:.3}|Bf:{},{}|FS:{},0>",

@@ -9,6 +9,8 @@
 //! and the drives hold their last setpoint meanwhile. Ticks in a burst would ask
 //! the drives for a step instead. The watchdog is fed only by a tick that met its
 //! deadline, so a controller that keeps missing is reset by the board.
+//!
+//! The digital outputs follow each tick's setpoint before its frame leaves.
 
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
@@ -17,7 +19,7 @@ use planner_core::motion::Motion;
 use planner_core::telemetry::SetpointFrame;
 use planner_core::units;
 
-use crate::board::{Stopwatch, Watchdog};
+use crate::board::{Outputs, Stopwatch, Watchdog};
 use crate::tasks::link::{Link, Order, Report};
 
 /// Frames between the control task and the setpoint task. The latter runs in the
@@ -40,6 +42,7 @@ pub async fn run(
     mut motion: Motion<'static>,
     link: &'static Link,
     frames: &'static Frames,
+    mut outputs: impl Outputs,
     stopwatch: impl Stopwatch,
     mut watchdog: impl Watchdog,
 ) -> ! {
@@ -51,8 +54,7 @@ pub async fn run(
         while let Some(order) = link.next_order() {
             report.orders = report.orders.wrapping_add(1);
             match order {
-                Order::Place(pose) => motion.place(pose),
-                Order::Start => motion.start(),
+                Order::Motion(order) => motion.obey(order),
                 Order::Robot(robot) => {
                     motion.set_robot(robot);
                     link.return_robot(robot);
@@ -66,6 +68,7 @@ pub async fn run(
         let start = stopwatch.now();
         let setpoint = motion.tick();
         let tick_cost = stopwatch.since(start);
+        outputs.set(setpoint.outputs);
 
         let last = report.setpoint;
         // Not only when everything has stopped: moves that come while the prefilter still
@@ -78,6 +81,7 @@ pub async fn run(
         report.worst_tick = report.worst_tick.max(tick_cost);
         report.previous_pose = last.pose;
         report.setpoint = setpoint;
+        report.queue_is_empty = motion.is_empty();
         let frame = SetpointFrame {
             sequence: report.ticks,
             setpoint,

@@ -7,15 +7,13 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use planner_core::config::Robot;
-use planner_core::motion::Setpoint;
+use planner_core::motion::{self, Setpoint};
 use planner_core::pose::Pose;
 
 /// What the command task asks of the control task. Obeyed in order, before the next tick.
 pub enum Order {
-    /// The tool is here. At rest only.
-    Place(Pose),
-    /// Execute the queued moves.
-    Start,
+    /// To the motion.
+    Motion(motion::Order),
     /// Other settings, in the one place they have; it goes back with
     /// [`Link::return_robot`]. At rest only.
     Robot(&'static mut Robot),
@@ -40,6 +38,8 @@ pub struct Report {
     pub starved: u32,
     /// Orders obeyed since the start.
     pub orders: u32,
+    /// Whether no move is queued or under way.
+    pub queue_is_empty: bool,
 }
 
 /// Orders under way: a place and a start may follow each other within a period.

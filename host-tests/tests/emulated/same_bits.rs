@@ -92,18 +92,20 @@ impl fmt::Display for Difference {
 }
 
 /// The fields of a setpoint, bit by bit.
-fn fields(setpoint: &Setpoint) -> [(&'static str, u32); 17] {
+fn fields(setpoint: &Setpoint) -> [(&'static str, u32); 18] {
     let Setpoint {
         pose,
         joints,
         state,
+        outputs,
     } = setpoint;
     let [x, y, z, c] = pose.to_bits().map(i32::cast_unsigned);
     let [v1, v2, v3, v4] = joints.velocity.map(f32::to_bits);
     let [a1, a2, a3, a4] = joints.acceleration.map(f32::to_bits);
     let position = &joints.position;
     [
-        ("state", u32::from(*state == MotionState::Running)),
+        ("state", *state as u32),
+        ("outputs", u32::from(*outputs)),
         ("x", x),
         ("y", y),
         ("z", z),
@@ -354,8 +356,9 @@ fn a_single_bit_is_found_and_named() {
     assert_eq!(first_difference(&host, &host), None);
     const TICK: usize = 1234;
     let flip = |value: &mut f32| *value = f32::from_bits(value.to_bits() ^ 1);
-    let changes: [&dyn Fn(&mut Setpoint); 17] = [
+    let changes: [&dyn Fn(&mut Setpoint); 18] = [
         &|s| s.state = MotionState::Idle,
+        &|s| s.outputs ^= 1,
         &|s| s.pose.x ^= LengthMm::DELTA,
         &|s| s.pose.y ^= LengthMm::DELTA,
         &|s| s.pose.z ^= LengthMm::DELTA,

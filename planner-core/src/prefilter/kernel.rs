@@ -127,15 +127,20 @@ impl Kernel {
         })
     }
 
-    /// How long the raw path stands at an exact stop, when it arrives `since_tick` after a tick.
+    /// `T_h`.
+    #[must_use]
+    pub fn length(&self) -> TickTime {
+        self.length
+    }
+
+    /// How long the raw path stands at an exact stop, when it arrives `until_tick` before a tick.
     ///
     /// `T_h`; for a pure shaper long enough that its last impulse, which is split over two
     /// ticks, is over at the first tick on the next segment: until then the output is not
     /// quite at the corner.
     #[must_use]
-    pub fn stop_time(&self, since_tick: TickTime) -> TickTime {
+    pub fn stop_time(&self, until_tick: TickTime) -> TickTime {
         let split = if self.is_pure_shaper {
-            let until_tick = (ONE_TICK - since_tick) % ONE_TICK;
             until_tick + ONE_TICK * (TickTime::from(self.delay_ticks) - 1)
         } else {
             0
