@@ -13,7 +13,7 @@ use firmware::tasks::{command, control, setpoints};
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::motion::{DelayLines, Motion};
 use planner_core::planner::Planner;
-use planner_core::raw::SegmentQueue;
+use planner_core::queue::SegmentQueue;
 use static_cell::{ConstStaticCell, StaticCell};
 
 #[cortex_m_rt::entry]

@@ -5,7 +5,7 @@ use std::fmt;
 use planner_core::config::Robot;
 use planner_core::motion::{DelayLines, Motion, MotionState, Order, Setpoint};
 use planner_core::planner::{Accepted, LineError, Planner};
-use planner_core::raw::SegmentQueue;
+use planner_core::queue::SegmentQueue;
 
 /// Why a program does not run; nothing has moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +50,8 @@ pub fn check(robot: &Robot, program: &str) -> Result<(), ProgramError> {
             Accepted::Queued => moves = true,
             Accepted::Nothing | Accepted::Reference(_) => {}
         }
-        while consumer.dequeue().is_some() {}
+        while consumer.pop().is_some() {}
+        while consumer.pop_kernel().is_some() {}
     }
     if moves {
         Ok(())
@@ -99,8 +100,8 @@ impl<'q> Controller<'q> {
     /// Runs a program to its end and hands each tick's setpoint to `each`.
     ///
     /// The queue is kept full, as a sender does that heeds `ok`; motion starts when the queue
-    /// is full or the program has ended. The first setpoint is the one at rest where the
-    /// motion starts, the last one its end at rest.
+    /// is full or the program has ended. A pause (M0) is resumed at once. The first setpoint is
+    /// the one at rest where the motion starts, the last one its end at rest.
     ///
     /// # Errors
     /// The first line that is refused. What was queued before it may have moved: [`check`]
@@ -119,6 +120,10 @@ impl<'q> Controller<'q> {
             }
             self.motion.obey(Order::Start);
             let setpoint = self.motion.tick();
+            if setpoint.state == MotionState::Paused {
+                self.motion.obey(Order::Resume);
+                continue;
+            }
             each(&setpoint);
             if setpoint.state == MotionState::Idle && !more {
                 return Ok(());

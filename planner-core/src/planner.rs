@@ -7,8 +7,10 @@ use crate::gcode::{self, Command, Defaults, Feed, Interpreter, Line, Modal, Move
 use crate::kinematics::{PoseError, SegmentError};
 use crate::path::PathSegment;
 use crate::pose::Pose;
-use crate::raw::{LONGEST_S, SegmentProducer};
-use crate::schedule::Schedule;
+use crate::prefilter::{PrefilterConfig, PrefilterError};
+use crate::queue::SegmentProducer;
+use crate::raw::{LONGEST_S, Pace};
+use crate::schedule::{Schedule, Timing};
 
 /// What became of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +19,7 @@ pub enum Accepted {
     Nothing,
     /// It is the first point of a program: the tool is taken to be there.
     Reference(Pose),
-    /// A segment was queued.
+    /// A segment or an action was queued.
     Queued,
     /// The program has ended.
     End,
@@ -46,6 +48,8 @@ pub enum Cause {
         /// How long it would take.
         duration_s: f64,
     },
+    /// The prefilter that a line asks for.
+    Prefilter(PrefilterError),
     /// The look-ahead is full: the caller did not wait for [`Planner::has_room`].
     Full,
 }
@@ -63,6 +67,7 @@ impl LineError {
             },
             Cause::TooSlow { .. } => 73,
             Cause::Full => 74,
+            Cause::Prefilter(_) => 75,
         }
     }
 }
@@ -74,6 +79,7 @@ impl fmt::Display for LineError {
             Cause::Gcode(error) => error.fmt(f),
             Cause::Pose(error) => error.fmt(f),
             Cause::Segment(error) => error.fmt(f),
+            Cause::Prefilter(error) => error.fmt(f),
             Cause::TooSlow { duration_s } => write!(
                 f,
                 "the segment would take {duration_s:.0} s, more than a day: give a higher feedrate"
@@ -98,11 +104,11 @@ pub struct Planner<'q> {
 impl<'q> Planner<'q> {
     /// A planner that has seen no line; the robot's position is not known yet.
     #[must_use]
-    pub fn new(robot: &Robot, segments: SegmentProducer<'q>) -> Self {
+    pub fn new(robot: &Robot, queue: SegmentProducer<'q>) -> Self {
         Self {
             robot: robot.clone(),
             interpreter: Interpreter::new(defaults(robot)),
-            schedule: Schedule::new(segments),
+            schedule: Schedule::new(queue),
         }
     }
 
@@ -141,6 +147,41 @@ impl<'q> Planner<'q> {
         self.schedule.reset();
     }
 
+    /// Goes on from where the motion has been stopped, the queue being empty.
+    pub fn stopped_at(&mut self, pose: Pose) {
+        self.interpreter.set_position(Some(pose));
+        self.schedule.reset();
+    }
+
+    /// Switches the digital outputs where the path has come to: bit 0 the gripper, bit 1 the
+    /// blow-off. The robot stops there first.
+    ///
+    /// # Errors
+    /// [`Cause::Full`].
+    pub fn switch_outputs(&mut self, outputs: u8) -> Result<Accepted, Cause> {
+        queued(self.schedule.switch(outputs))
+    }
+
+    /// Pauses where the path has come to, until the motion is resumed.
+    ///
+    /// # Errors
+    /// [`Cause::Full`].
+    pub fn pause(&mut self) -> Result<Accepted, Cause> {
+        queued(self.schedule.pause())
+    }
+
+    /// Changes the prefilter where the path has come to. The robot stops there first.
+    ///
+    /// # Errors
+    /// [`Cause::Prefilter`] or [`Cause::Full`]; nothing is changed then.
+    pub fn change_prefilter(&mut self, config: &PrefilterConfig) -> Result<Accepted, Cause> {
+        if !self.has_room() {
+            return Err(Cause::Full);
+        }
+        self.robot.set_prefilter(config).map_err(Cause::Prefilter)?;
+        queued(self.schedule.change_prefilter(&self.robot.kernel))
+    }
+
     /// The state after a line, once its command is queued.
     fn interpret(&mut self, text: &[u8]) -> Result<(Modal, Accepted), Cause> {
         let line = Line::parse(text).map_err(Cause::Gcode)?;
@@ -154,7 +195,7 @@ impl<'q> Planner<'q> {
                 Ok(Accepted::Reference(pose))
             }
             Command::Dwell { seconds } => self.stand_still(f64::from(seconds)),
-            Command::Pause => self.stand_still(0.0),
+            Command::Pause => self.pause(),
             Command::Move(order) => self.queue(&order),
         }?;
         Ok((modal, accepted))
@@ -165,16 +206,13 @@ impl<'q> Planner<'q> {
         let Some(pose) = self.interpreter.modal().position() else {
             return Ok(Accepted::Nothing);
         };
-        if self.schedule.dwell(&self.robot, pose, duration_s) {
-            Ok(Accepted::Queued)
-        } else {
-            Err(Cause::Full)
-        }
+        queued(self.schedule.dwell(pose, duration_s))
     }
 
     fn queue(&mut self, order: &Move) -> Result<Accepted, Cause> {
         let path = order.path;
-        let duration_s = self.duration_s(&path, order.feed);
+        let timing = self.timing(&path, order.feed);
+        let duration_s = timing.duration_s;
         if duration_s == 0.0 {
             return Ok(Accepted::Nothing);
         }
@@ -187,31 +225,36 @@ impl<'q> Planner<'q> {
             .map_err(Cause::Segment)?;
         let planned = self
             .schedule
-            .plan(&self.robot, &path, duration_s, order.corner_tolerance_mm);
-        if planned {
-            Ok(Accepted::Queued)
-        } else {
-            Err(Cause::Full)
-        }
+            .plan(&self.robot, &path, &timing, order.corner_tolerance_mm);
+        queued(planned)
     }
 
     /// How long a segment takes: at its feedrate, and no faster than feedrate and yaw limits.
     ///
     /// A segment that only turns takes its feedrate in °/s.
-    fn duration_s(&self, path: &PathSegment, feed: Feed) -> f64 {
+    fn timing(&self, path: &PathSegment, feed: Feed) -> Timing {
         let config = &self.robot.config;
-        let feed = match feed {
-            Feed::Rapid => config.rapid_mm_s,
-            Feed::MmPerS(feed) => feed,
+        let (feed, pace) = match feed {
+            Feed::Rapid => (config.rapid_mm_s, Pace::Rapid),
+            Feed::MmPerS(feed) => (feed, Pace::Feed),
         };
-        let length_mm = path.length_mm();
-        let turn_s = |rate_deg_s: f32| libm::fabs(path.turn_deg()) / f64::from(rate_deg_s);
-        if length_mm > 0.0 {
-            let feed_mm_s = feed.min(config.feed_limit_mm_s);
-            (length_mm / f64::from(feed_mm_s)).max(turn_s(config.yaw_limit_deg_s))
-        } else {
-            turn_s(feed.min(config.yaw_limit_deg_s))
+        let (length_mm, turn_deg) = (path.length_mm(), libm::fabs(path.turn_deg()));
+        let shortest_s = (length_mm / f64::from(config.feed_limit_mm_s))
+            .max(turn_deg / f64::from(config.yaw_limit_deg_s));
+        let way = if length_mm > 0.0 { length_mm } else { turn_deg };
+        Timing {
+            duration_s: (way / f64::from(feed)).max(shortest_s),
+            shortest_s,
+            pace,
         }
+    }
+}
+
+fn queued(done: bool) -> Result<Accepted, Cause> {
+    if done {
+        Ok(Accepted::Queued)
+    } else {
+        Err(Cause::Full)
     }
 }
 
