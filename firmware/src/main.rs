@@ -15,7 +15,7 @@ use planner_core::config::Robot;
 use planner_core::motion::{DelayLines, Motion};
 use planner_core::planner::Planner;
 use planner_core::protocol::{Controller, Identity, Settings};
-use planner_core::raw::SegmentQueue;
+use planner_core::queue::SegmentQueue;
 use static_cell::{ConstStaticCell, StaticCell};
 
 #[cortex_m_rt::entry]

@@ -8,11 +8,13 @@ use planner_core::motion::{DelayLines, Motion, Order, Setpoint};
 use planner_core::planner::Planner;
 use fixed::traits::ToFixed;
 use planner_core::pose::{JointPosition, Pose};
-use planner_core::protocol::inbox::READ_BYTES;
 use planner_core::protocol::{
     Controller, Health, Identity, Inputs, RECORD_BYTES, Record, Report, Settings, Step,
 };
-use planner_core::raw::{LOOKAHEAD, SegmentQueue};
+use planner_core::queue::{LOOKAHEAD, SegmentQueue};
+
+/// Bytes that a port hands over at once.
+const PORT_BYTES: usize = 64;
 
 /// What is kept over a restart, here in memory.
 pub type Records = HashMap<Record, Vec<u8>>;
@@ -24,8 +26,8 @@ pub struct SerialLoop<'q> {
     report: Report,
     now_ms: u64,
     output: Vec<u8>,
-    /// What the next bytes find no room for: a port's buffer.
-    waiting: Vec<u8>,
+    /// Orders obeyed; the next tick reports them.
+    obeyed: u32,
     /// What is kept.
     pub records: Records,
     /// The board's inputs, as the next tick reports them.
@@ -63,7 +65,7 @@ pub fn with_controller<R>(records: Records, body: impl FnOnce(&mut SerialLoop<'_
         report: Report::default(),
         now_ms: 0,
         output: Vec::new(),
-        waiting: Vec::new(),
+        obeyed: 0,
         records,
         inputs: Inputs::default(),
         encoders: None,
@@ -76,8 +78,7 @@ pub fn with_controller<R>(records: Records, body: impl FnOnce(&mut SerialLoop<'_
 impl SerialLoop<'_> {
     /// Sends bytes; they arrive at once, as far as there is room.
     pub fn send(&mut self, bytes: &[u8]) {
-        self.waiting.extend_from_slice(bytes);
-        self.serve();
+        self.send_watched(bytes, |_| ());
     }
 
     /// Everything said since the last call.
@@ -158,8 +159,12 @@ impl SerialLoop<'_> {
 
     /// Like [`SerialLoop::send`]; `watch` sees every step of the controller.
     pub fn send_watched(&mut self, bytes: &[u8], mut watch: impl FnMut(&Self)) {
-        self.waiting.extend_from_slice(bytes);
-        self.serve_watched(&mut watch);
+        for chunk in bytes.chunks(PORT_BYTES) {
+            for &byte in chunk {
+                self.controller.receive(byte, self.now_ms);
+            }
+            self.serve_watched(&mut watch);
+        }
     }
 
     /// One millisecond: a tick of the motion, and all that the controller has to do then.
@@ -175,7 +180,7 @@ impl SerialLoop<'_> {
         self.report = Report {
             setpoint,
             previous_pose: before,
-            orders: self.report.orders,
+            orders: self.obeyed,
             inputs: self.inputs,
             encoders: self.encoders,
             health: Health {
@@ -186,27 +191,9 @@ impl SerialLoop<'_> {
         self.serve_watched(&mut watch);
     }
 
-    /// Lets the controller do all it has to do now.
-    fn serve(&mut self) {
-        self.serve_watched(&mut |_| ());
-    }
-
-    /// Likewise; `watch` sees every step.
+    /// Lets the controller do all it has to do now; `watch` sees every step.
     fn serve_watched(&mut self, watch: &mut impl FnMut(&Self)) {
-        loop {
-            while !self.waiting.is_empty() && self.controller.has_room() {
-                let count = self.waiting.len().min(READ_BYTES);
-                for byte in self.waiting.drain(..count) {
-                    self.controller.receive(byte, self.now_ms);
-                }
-                if !self.step() {
-                    break;
-                }
-                watch(self);
-            }
-            if !self.step() {
-                break;
-            }
+        while self.step() {
             watch(self);
         }
     }
@@ -239,6 +226,6 @@ impl SerialLoop<'_> {
 
     fn obey(&mut self, order: Order) {
         self.motion.obey(order);
-        self.report.orders = self.report.orders.wrapping_add(1);
+        self.obeyed = self.obeyed.wrapping_add(1);
     }
 }

@@ -5,7 +5,7 @@ use std::fmt;
 use planner_core::config::Robot;
 use planner_core::motion::{DelayLines, Motion, MotionState, Order, Setpoint};
 use planner_core::planner::{LineError, Planner};
-use planner_core::raw::SegmentQueue;
+use planner_core::queue::SegmentQueue;
 
 /// Why a program does not run; nothing has moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +50,8 @@ pub fn check(robot: &Robot, program: &str) -> Result<(), ProgramError> {
         if accepted.ended {
             break;
         }
-        while consumer.dequeue().is_some() {}
+        while consumer.pop().is_some() {}
+        while consumer.pop_kernel().is_some() {}
     }
     if moves {
         Ok(())

@@ -136,6 +136,20 @@ impl Robot {
             prefilter,
         })
     }
+
+    /// Changes the prefilter.
+    ///
+    /// # Errors
+    /// [`PrefilterError`] names the value that is out of range; nothing is changed then.
+    pub fn set_prefilter(&mut self, config: &PrefilterConfig) -> Result<(), PrefilterError> {
+        let prefilter = Prefilter::new(config)?;
+        self.kernel = Kernel::new(&prefilter)?;
+        self.accelerating = prefilter.response();
+        self.decelerating = prefilter.reversed_response();
+        self.prefilter = prefilter;
+        self.config.prefilter = *config;
+        Ok(())
+    }
 }
 
 /// Why a `name=value` setting is refused.

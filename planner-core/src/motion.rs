@@ -5,10 +5,10 @@ use crate::config::Robot;
 use crate::kinematics::Scara;
 use crate::pose::{AXES, JointState, Pose};
 use crate::prefilter::{Convolver, FINE_BITS, Kernel};
-use crate::raw::SegmentConsumer;
-
+use crate::queue::{Action, RawItem, SegmentConsumer};
+use crate::rate::Rate;
 use crate::units::TICK_HZ;
-use crate::walker::Walker;
+use crate::walker::{Rates, Walker};
 
 /// Whether the robot moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,8 +62,6 @@ pub struct Setpoint {
     pub state: MotionState,
     /// The digital outputs: bit 0 the gripper, bit 1 the blow-off.
     pub outputs: u8,
-    /// Line number of the move under way.
-    pub line: u32,
 }
 
 /// The delay lines of the filters: most of the core's memory, 25 KiB, apart from [`Motion`] so
@@ -159,9 +157,12 @@ impl<'q> Motion<'q> {
             Order::Resume => self.resume(),
             Order::Stop => self.stop(),
             Order::Rates {
-                feed_percent: _,
-                rapid_percent: _,
-            } => {}
+                feed_percent,
+                rapid_percent,
+            } => self.walker.set_rates(Rates {
+                feed: Rate::from_percent(feed_percent.clamp(10, 200)),
+                rapid: Rate::from_percent(u16::from(rapid_percent).clamp(1, 100)),
+            }),
         }
     }
 
@@ -222,9 +223,7 @@ impl<'q> Motion<'q> {
             Mode::Running | Mode::Stopping { .. } => self.command(),
             Mode::Idle | Mode::Held | Mode::Paused => self.history[1],
             Mode::Forgetting => {
-                if self.walker.forget(FORGOTTEN_A_TICK) {
-                    self.mode = Mode::Idle;
-                }
+                self.forget_some();
                 self.history[1]
             }
         };
@@ -240,7 +239,6 @@ impl<'q> Motion<'q> {
             joints: self.kinematics.joint_state(&pose, velocity, acceleration),
             state: self.state(),
             outputs: self.outputs,
-            line: 0,
         }
     }
 
@@ -270,7 +268,7 @@ impl<'q> Motion<'q> {
     /// The newest command in 2^-32 mm: one tick of the raw path, filtered.
     fn command(&mut self) -> [i64; AXES] {
         self.walker.hold(self.mode != Mode::Running);
-        let raw = self.walker.step(self.arcs.has_room());
+        let raw = self.walker.step(&self.kernel, self.arcs.has_room());
         let [x, y, z, c] = self.filters.lines.process(&self.kernel, raw.chord);
         let [bow_x, bow_y] = self.arcs.step(&mut self.filters.arcs, &self.kernel, &raw);
         let newest = [x.wrapping_add(bow_x), y.wrapping_add(bow_y), z, c];
@@ -281,19 +279,32 @@ impl<'q> Motion<'q> {
         };
         // the filters and then the two ticks of history have settled
         if self.stood_for > self.kernel.length_ticks() + 2 {
-            self.settled();
+            self.come_to_rest();
             return self.history[1];
         }
         newest
     }
 
-    /// Everything has come to rest.
-    fn settled(&mut self) {
+    /// What happens when everything stands.
+    fn come_to_rest(&mut self) {
         match self.mode {
-            Mode::Running if self.walker.is_done() => self.mode = Mode::Idle,
+            Mode::Running => self.act(),
             Mode::Stopping { forget: false } => self.mode = Mode::Held,
             Mode::Stopping { forget: true } => self.forget(),
-            Mode::Idle | Mode::Running | Mode::Held | Mode::Paused | Mode::Forgetting => {}
+            Mode::Idle | Mode::Held | Mode::Paused | Mode::Forgetting => {}
+        }
+    }
+
+    /// Carries out the action that waits here, one a tick; idle when nothing more waits.
+    fn act(&mut self) {
+        match self.walker.take_action() {
+            Some(Action::Outputs(outputs)) => self.outputs = outputs,
+            Some(Action::Pause) => self.mode = Mode::Paused,
+            Some(Action::Prefilter) => self.change_prefilter(),
+            None => {}
+        }
+        if self.mode == Mode::Running && self.walker.is_done() {
+            self.mode = Mode::Idle;
         }
     }
 
@@ -301,6 +312,29 @@ impl<'q> Motion<'q> {
     fn forget(&mut self) {
         self.rest_at(self.nearest_point());
         self.mode = Mode::Forgetting;
+    }
+
+    /// Forgets the oldest of what is queued; idle when nothing is left. Changes of the
+    /// prefilter are made all the same: the planner goes on with the last one.
+    fn forget_some(&mut self) {
+        for _ in 0..FORGOTTEN_A_TICK {
+            match self.walker.forget() {
+                Some(RawItem::Action(Action::Prefilter)) => self.change_prefilter(),
+                Some(RawItem::Action(_) | RawItem::Segment(_)) => {}
+                None => {
+                    self.mode = Mode::Idle;
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Goes on with the next kernel, at rest.
+    fn change_prefilter(&mut self) {
+        if let Some(kernel) = self.walker.take_kernel() {
+            self.kernel = kernel;
+            self.rest_at(self.nearest_point());
+        }
     }
 
     /// The command at rest as a pose can tell it. Between the ends of an arc that is not exact.

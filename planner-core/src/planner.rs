@@ -5,13 +5,15 @@ use core::fmt;
 use crate::config::Robot;
 use crate::gcode::{
     self, Command, Defaults, Feed, Interpreted, Interpreter, Line, MAX_ACTIONS_A_LINE, Move,
-    Offsets, ProgramFlow,
+    Offsets, ProgramFlow, RobotChange,
 };
 use crate::kinematics::{PoseError, SegmentError};
 use crate::path::PathSegment;
 use crate::pose::Pose;
-use crate::raw::{LONGEST_S, SegmentProducer};
-use crate::schedule::Schedule;
+use crate::prefilter::{Kernel, Prefilter, PrefilterConfig, PrefilterError};
+use crate::queue::SegmentProducer;
+use crate::raw::{LONGEST_S, Pace};
+use crate::schedule::{Schedule, Timing};
 
 /// What became of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -48,8 +50,10 @@ pub enum Cause {
     Segment(SegmentError),
     /// Part of the jog cannot be reached.
     Jog(SegmentError),
-    /// M100 to M102.
-    RobotChange,
+    /// The prefilter of M100.
+    Prefilter(PrefilterError),
+    /// M101 and M102: the arm would have to pass its stretched pose.
+    Elbow,
     /// The segment would take more than a day.
     TooSlow {
         /// How long it would take.
@@ -73,7 +77,8 @@ impl LineError {
             Cause::Jog(_) => 15,
             Cause::TooSlow { .. } => 73,
             Cause::Full => 74,
-            Cause::RobotChange => 79,
+            Cause::Prefilter(_) => 76,
+            Cause::Elbow => 79,
         }
     }
 }
@@ -93,9 +98,10 @@ impl fmt::Display for LineError {
             Cause::Gcode(error) => error.fmt(f),
             Cause::Pose(error) => error.fmt(f),
             Cause::Segment(error) | Cause::Jog(error) => error.fmt(f),
-            Cause::RobotChange => {
-                f.write_str("prefilter and elbow change at rest only: use their settings")
-            }
+            Cause::Prefilter(error) => error.fmt(f),
+            Cause::Elbow => f.write_str(
+                "the elbow cannot change its side inside a program: set $elbow at rest, and home",
+            ),
             Cause::TooSlow { duration_s } => write!(
                 f,
                 "the segment would take {duration_s:.0} s, more than a day: give a higher feedrate"
@@ -122,12 +128,12 @@ pub struct Planner<'q> {
 impl<'q> Planner<'q> {
     /// A planner that has seen no line; the robot's position is not known yet.
     #[must_use]
-    pub fn new(robot: &Robot, segments: SegmentProducer<'q>) -> Self {
+    pub fn new(robot: &Robot, queue: SegmentProducer<'q>) -> Self {
         Self {
             robot: robot.clone(),
             interpreter: Interpreter::new(defaults(robot)),
             checking: None,
-            schedule: Schedule::new(segments),
+            schedule: Schedule::new(queue),
         }
     }
 
@@ -200,7 +206,7 @@ impl<'q> Planner<'q> {
             .interpret(line)
             .map_err(Cause::Gcode)
             .and_then(|interpreted| {
-                self.durations_s(&interpreted.command)?;
+                self.timings(&interpreted.command)?;
                 Ok(interpreted)
             });
         match &checked {
@@ -219,7 +225,7 @@ impl<'q> Planner<'q> {
     pub fn would_accept(&mut self, line: &Line) -> Result<(), LineError> {
         let interpreted = self.interpreter.interpret(line);
         let interpreted = interpreted.map_err(|error| self.refused(error))?;
-        let checked = self.durations_s(&interpreted.command);
+        let checked = self.timings(&interpreted.command);
         checked.map(drop).map_err(|cause| self.refusal(cause))
     }
 
@@ -269,7 +275,7 @@ impl<'q> Planner<'q> {
     /// Queues the actions of a line, all or none, and commits what it leaves behind.
     fn carry_out(&mut self, interpreted: &Interpreted) -> Result<Accepted, Cause> {
         let command = &interpreted.command;
-        let durations_s = self.durations_s(command)?;
+        let timings = self.timings(command)?;
         if !self.has_room() {
             return Err(Cause::Full);
         }
@@ -277,20 +283,28 @@ impl<'q> Planner<'q> {
             self.schedule.reset();
         }
         let mut queued = false;
+        if let Some(RobotChange::Prefilter(config)) = &command.robot {
+            self.robot.set_prefilter(config).map_err(Cause::Prefilter)?;
+            queued |= self.schedule.change_prefilter(&self.robot.kernel);
+        }
+        if let Some(outputs) = command.outputs {
+            queued |= self.schedule.switch(outputs);
+        }
         if let Some(duration_s) = command.dwell_s {
             queued |= self.stand_still(f64::from(duration_s));
         }
-        for (order, duration_s) in command.moves.iter().zip(durations_s) {
-            let tolerance_mm = order.corner_tolerance_mm;
-            let robot = &self.robot;
-            queued |= duration_s > 0.0
+        for (order, timing) in command.moves.iter().zip(&timings) {
+            queued |= timing.duration_s > 0.0
                 && self
                     .schedule
-                    .plan(robot, &order.path, duration_s, tolerance_mm);
+                    .plan(&self.robot, &order.path, timing, order.corner_tolerance_mm);
+        }
+        if let Some(outputs) = command.outputs_after {
+            queued |= self.schedule.switch(outputs);
         }
         self.interpreter.commit(interpreted);
         if command.flow == Some(ProgramFlow::Pause) {
-            queued |= self.stand_still(0.0);
+            queued |= self.schedule.pause();
         }
         Ok(Accepted {
             reference: command.reference,
@@ -302,59 +316,73 @@ impl<'q> Planner<'q> {
     }
 
     /// How long each motion of a line takes, once the robot can do all that the line asks for.
-    fn durations_s(&self, command: &Command) -> Result<[f64; 2], Cause> {
-        if command.robot.is_some() {
-            return Err(Cause::RobotChange);
+    fn timings(&self, command: &Command) -> Result<[Timing; 2], Cause> {
+        match &command.robot {
+            Some(RobotChange::Prefilter(config)) => {
+                Self::check_prefilter(config).map_err(Cause::Prefilter)?;
+            }
+            Some(RobotChange::Elbow(elbow)) if *elbow != self.robot.config.scara.elbow => {
+                return Err(Cause::Elbow);
+            }
+            Some(RobotChange::Elbow(_)) | None => {}
         }
         if let Some(pose) = &command.reference {
             self.robot.scara.check(pose).map_err(Cause::Pose)?;
         }
-        let mut durations_s = [0.0; 2];
-        for (order, duration_s) in command.moves.iter().zip(&mut durations_s) {
-            *duration_s = self.checked_duration_s(order)?;
+        let mut timings = [Timing::default(); 2];
+        for (order, timing) in command.moves.iter().zip(&mut timings) {
+            *timing = self.checked_timing(order)?;
         }
-        Ok(durations_s)
+        Ok(timings)
+    }
+
+    /// Whether a prefilter can be made of these settings.
+    fn check_prefilter(config: &PrefilterConfig) -> Result<(), PrefilterError> {
+        Kernel::new(&Prefilter::new(config)?).map(drop)
     }
 
     /// How long a motion takes; zero if it is shorter than anything.
-    fn checked_duration_s(&self, order: &Move) -> Result<f64, Cause> {
-        let duration_s = self.duration_s(&order.path, order.feed);
-        if duration_s > LONGEST_S {
-            return Err(Cause::TooSlow { duration_s });
+    fn checked_timing(&self, order: &Move) -> Result<Timing, Cause> {
+        let timing = self.timing(&order.path, order.feed);
+        if timing.duration_s > LONGEST_S {
+            return Err(Cause::TooSlow {
+                duration_s: timing.duration_s,
+            });
         }
-        if duration_s > 0.0 {
+        if timing.duration_s > 0.0 {
             let checked = self.robot.scara.check_segment(&order.path);
             checked.map_err(Cause::Segment)?;
         }
-        Ok(duration_s)
+        Ok(timing)
     }
 
     /// Stops, then stands for so long; where the position is unknown nothing has moved.
     /// Whether anything was queued.
     fn stand_still(&mut self, duration_s: f64) -> bool {
         let position = self.interpreter.modal().position();
-        position.is_some_and(|pose| self.schedule.dwell(&self.robot, pose, duration_s))
+        position.is_some_and(|pose| self.schedule.dwell(pose, duration_s))
     }
 
     /// How long a segment takes: at its feedrate, and no faster than feedrate and yaw limits.
     ///
     /// A segment that only turns takes its feedrate in °/s.
-    fn duration_s(&self, path: &PathSegment, feed: Feed) -> f64 {
+    fn timing(&self, path: &PathSegment, feed: Feed) -> Timing {
         let config = &self.robot.config;
-        let (feed, at_least_s) = match feed {
-            Feed::Rapid => (config.rapid_mm_s, 0.0),
-            Feed::MmPerS(feed) => (feed, 0.0),
-            Feed::Seconds(duration_s) => (f32::INFINITY, f64::from(duration_s)),
+        let (length_mm, turn_deg) = (path.length_mm(), libm::fabs(path.turn_deg()));
+        let shortest_s = (length_mm / f64::from(config.feed_limit_mm_s))
+            .max(turn_deg / f64::from(config.yaw_limit_deg_s));
+        let way = if length_mm > 0.0 { length_mm } else { turn_deg };
+        let (wanted_s, pace) = match feed {
+            Feed::Rapid => (way / f64::from(config.rapid_mm_s), Pace::Rapid),
+            Feed::MmPerS(feed) => (way / f64::from(feed), Pace::Feed),
+            Feed::Seconds(duration_s) => (f64::from(duration_s), Pace::Feed),
         };
-        let length_mm = path.length_mm();
-        let turn_s = |rate_deg_s: f32| libm::fabs(path.turn_deg()) / f64::from(rate_deg_s);
-        let limited_s = if length_mm > 0.0 {
-            let feed_mm_s = feed.min(config.feed_limit_mm_s);
-            (length_mm / f64::from(feed_mm_s)).max(turn_s(config.yaw_limit_deg_s))
-        } else {
-            turn_s(feed.min(config.yaw_limit_deg_s))
-        };
-        limited_s.max(at_least_s)
+        let is_move = way > 0.0;
+        Timing {
+            duration_s: if is_move { wanted_s.max(shortest_s) } else { 0.0 },
+            shortest_s,
+            pace,
+        }
     }
 }
 

@@ -4,27 +4,12 @@
 //! a segment counts in 2^-62 of the segment; an arc is its chord, which is filtered with the
 //! lines, plus its bow, which is a function of the filtered progress.
 
-use heapless::spsc::{Consumer, Producer, Queue};
-
 use crate::math::sin_cos;
 use crate::path::PathSegment;
 use crate::path::{Arc, Shape};
 use crate::pose::{AXES, Pose};
+use crate::rate::Rate;
 use crate::units::TICK_HZ;
-
-/// Segments that can wait between the planner and the tick: the look-ahead.
-///
-/// 64 segments of 0.5 mm at 160 mm/s last 0.2 s, longer than a serial line hesitates.
-pub const LOOKAHEAD: usize = 64;
-
-/// The queue between planner and tick; one place stays empty to tell full from empty.
-pub type SegmentQueue = Queue<RawSegment, { LOOKAHEAD + 1 }>;
-
-/// The planner's end of the queue.
-pub type SegmentProducer<'q> = Producer<'q, RawSegment>;
-
-/// The tick's end of the queue.
-pub type SegmentConsumer<'q> = Consumer<'q, RawSegment>;
 
 /// A time in 2^-32 ticks (0.23 ps).
 pub type TickTime = i64;
@@ -58,17 +43,36 @@ pub struct RawSegment {
     pub duration: TickTime,
     /// Progress a tick, in 2^-62 of the segment.
     pub rate: u64,
-    /// How long the raw path stands still before it, counted from the end of the segment
-    /// before.
-    pub dwell: TickTime,
+    /// How long before the deceleration of the segment before ends it begins to accelerate;
+    /// 0 after an exact stop.
+    pub overlap: TickTime,
     /// What an arc adds to its chord.
     pub bow: Option<Bow>,
+    /// The highest rate at which it may be walked, from [`Rate::ONE`] on.
+    pub top_rate: Rate,
+    /// Whether no other corner is still being rounded when it begins.
+    pub begins_alone: bool,
+    /// What sets its rate.
+    pub pace: Pace,
+}
+
+/// Which override a segment follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pace {
+    /// That of feedrates (G1 to G3).
+    Feed,
+    /// That of rapids (G0).
+    Rapid,
+    /// None, because nothing moves (G4).
+    #[default]
+    StandStill,
 }
 
 impl RawSegment {
-    /// A segment that takes `duration_s` (one tick to [`LONGEST_S`]) after `dwell`.
+    /// A segment that takes `duration_s` (one tick to [`LONGEST_S`]), after an exact stop and
+    /// no faster than that.
     #[must_use]
-    pub fn new(path: &PathSegment, duration_s: f64, dwell: TickTime) -> Self {
+    pub fn new(path: &PathSegment, duration_s: f64) -> Self {
         let duration = tick_time(duration_s).max(ONE_TICK);
         let ticks = duration as f64 / ONE_TICK as f64;
         Self {
@@ -76,23 +80,35 @@ impl RawSegment {
             target: path.target.to_bits(),
             duration,
             rate: (WHOLE as f64 / ticks) as u64,
-            dwell,
+            overlap: 0,
             bow: match path.shape {
                 Shape::Line => None,
                 Shape::Arc(arc) => Some(Bow::new(&arc)),
             },
+            top_rate: Rate::ONE,
+            begins_alone: true,
+            pace: Pace::Feed,
         }
     }
 
     /// A stand-still of `duration_s` at a pose.
     #[must_use]
-    pub fn stand_still(pose: Pose, duration_s: f64, dwell: TickTime) -> Self {
+    pub fn stand_still(pose: Pose, duration_s: f64) -> Self {
         let path = PathSegment {
             start: pose,
             target: pose,
             shape: Shape::Line,
         };
-        Self::new(&path, duration_s, dwell)
+        Self {
+            pace: Pace::StandStill,
+            ..Self::new(&path, duration_s)
+        }
+    }
+
+    /// Whether it is a motion, and no stand-still.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.pace != Pace::StandStill
     }
 
     /// The point of the chord after `progress` in 2^-30 of the segment.

@@ -11,8 +11,10 @@ use crate::corner::{self, Corner, Side, reach_s};
 use crate::math::sqrt_f32;
 use crate::path::PathSegment;
 use crate::pose::Pose;
-use crate::prefilter::Response;
-use crate::raw::{LONGEST_S, ONE_TICK, RawSegment, SegmentProducer, TickTime, tick_time};
+use crate::prefilter::{Kernel, Response};
+use crate::queue::{Action, RawItem, SegmentProducer};
+use crate::rate::Rate;
+use crate::raw::{LONGEST_S, ONE_TICK, Pace, RawSegment, TickTime, tick_time};
 use crate::units::TICK_S;
 
 /// Corners that can still be rounding when another one begins. With more, the next segment
@@ -21,6 +23,9 @@ const BLENDING_CORNERS: usize = 64;
 
 /// What the fixed-point trace can miss a point by, in mm: ten times its resolution.
 const RESOLUTION_MM: f32 = 2e-5;
+
+/// A segment of so long lasts a tick at the highest rate.
+const SHORTEST_HURRIED: TickTime = 2 * ONE_TICK;
 
 /// One control tick in seconds.
 const TICK: f32 = TICK_S as f32;
@@ -39,48 +44,56 @@ struct Blend {
     tolerance_mm: f32,
 }
 
+/// How long a segment takes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Timing {
+    /// As programmed, within the robot's limits.
+    pub duration_s: f64,
+    /// At the robot's limits: no override makes it shorter.
+    pub shortest_s: f64,
+    /// Which override it follows.
+    pub pace: Pace,
+}
+
+/// How a segment follows the one before.
+struct Joint {
+    /// How long it begins before the other's deceleration ends; 0 is an exact stop.
+    overlap: TickTime,
+    /// Whether no other corner is being rounded then.
+    alone: bool,
+}
+
 /// Times segments and hands them to the tick.
 pub struct Schedule<'q> {
-    segments: SegmentProducer<'q>,
+    queue: SegmentProducer<'q>,
     /// The segment that the next one makes a corner with; none where the path must stop.
     previous: Option<Side>,
-    /// How long after a tick the raw path planned so far ends, if the look-ahead never runs
-    /// dry: then the path goes on at a tick.
-    since_tick: TickTime,
     /// The corners that are still being rounded, oldest first.
     blends: Deque<Blend, BLENDING_CORNERS>,
 }
 
 impl<'q> Schedule<'q> {
     /// An empty schedule.
-    pub fn new(segments: SegmentProducer<'q>) -> Self {
+    pub fn new(queue: SegmentProducer<'q>) -> Self {
         Self {
-            segments,
+            queue,
             previous: None,
-            since_tick: 0,
             blends: Deque::new(),
         }
     }
 
-    /// Whether the look-ahead has room for another segment.
-    pub fn has_room(&self) -> bool {
-        self.segments.ready()
-    }
-
-    /// Segments that the look-ahead has room for.
+    /// Segments and actions that the look-ahead has room for.
     pub fn free_places(&self) -> usize {
-        self.segments.capacity() - self.segments.len()
+        self.queue.free_places()
     }
 
     /// Forgets what came before: the next segment begins from rest.
     pub fn reset(&mut self) {
         self.previous = None;
-        self.since_tick = 0;
         self.blends.clear();
     }
 
-    /// Plans a segment that follows the last one, in `duration_s` (the caller has limited its
-    /// feedrate), with `tolerance_mm` at the corner between the two.
+    /// Plans a segment that follows the last one, with `tolerance_mm` at the corner between the two.
     ///
     /// The tolerance holds for segments of any length. A corner that is rounded alone misses
     /// by its `e_c`. Where several are being rounded at once, the command is a weighted mean
@@ -101,11 +114,11 @@ impl<'q> Schedule<'q> {
         &mut self,
         robot: &Robot,
         path: &PathSegment,
-        duration_s: f64,
+        timing: &Timing,
         tolerance_mm: f32,
     ) -> bool {
         let length_mm = path.length_mm() as f32;
-        let duration_s = duration_s.clamp(TICK_S, LONGEST_S);
+        let duration_s = timing.duration_s.clamp(TICK_S, LONGEST_S);
         let (first_tangent, last_tangent, heading_rate_per_mm) = path.tangents();
         let side = |tangent| Side {
             feed_mm_s: length_mm / duration_s as f32,
@@ -113,57 +126,97 @@ impl<'q> Schedule<'q> {
             heading_rate_per_mm,
             length_mm,
         };
-        if !self.has_room() {
+        if self.free_places() == 0 {
             return false;
         }
-        let dwell = match self.previous {
-            None => 0,
+        let joint = match self.previous {
+            None => Joint {
+                overlap: 0,
+                alone: true,
+            },
             Some(arriving) => self.corner(robot, &arriving, &side(first_tangent), tolerance_mm),
         };
         self.previous = Some(side(last_tangent));
-        self.push(RawSegment::new(path, duration_s, dwell))
+        let segment = RawSegment {
+            overlap: joint.overlap,
+            begins_alone: joint.alone,
+            pace: timing.pace,
+            ..RawSegment::new(path, duration_s)
+        };
+        let passed = robot.kernel.length() - joint.overlap + segment.duration;
+        for blend in &mut self.blends {
+            blend.ends -= passed;
+        }
+        // A segment may be hurried if the corner before it is done at its end.
+        let stands_alone = passed >= robot.kernel.settling_time();
+        let top_rate = if stands_alone && segment.duration >= SHORTEST_HURRIED {
+            Rate::at_least_one(duration_s / timing.shortest_s)
+        } else {
+            Rate::ONE
+        };
+        self.queue.push(RawItem::Segment(RawSegment {
+            top_rate,
+            ..segment
+        }))
     }
 
     /// Plans a stand-still of `duration_s` after everything has stopped.
     ///
     /// `false` if the look-ahead is full.
-    pub fn dwell(&mut self, robot: &Robot, pose: Pose, duration_s: f64) -> bool {
-        let settle = robot.kernel.stop_time(self.since_tick);
-        self.previous = None;
-        self.blends.clear();
-        self.push(RawSegment::stand_still(
-            pose,
-            duration_s.clamp(TICK_S, LONGEST_S),
-            settle,
-        ))
+    pub fn dwell(&mut self, pose: Pose, duration_s: f64) -> bool {
+        let duration_s = duration_s.clamp(TICK_S, LONGEST_S);
+        self.push_stopped(RawItem::Segment(RawSegment::stand_still(pose, duration_s)))
     }
 
-    fn push(&mut self, segment: RawSegment) -> bool {
-        let passed = segment.dwell + segment.duration;
-        self.since_tick = (self.since_tick + passed) % ONE_TICK;
-        for blend in &mut self.blends {
-            blend.ends -= passed;
+    /// Switches the digital outputs after everything has stopped: bit 0 the gripper, bit 1 the
+    /// blow-off.
+    ///
+    /// `false` if the look-ahead is full.
+    pub fn switch(&mut self, outputs: u8) -> bool {
+        self.push_stopped(RawItem::Action(Action::Outputs(outputs)))
+    }
+
+    /// Pauses after everything has stopped, until the motion is resumed.
+    ///
+    /// `false` if the look-ahead is full.
+    pub fn pause(&mut self) -> bool {
+        self.push_stopped(RawItem::Action(Action::Pause))
+    }
+
+    /// Changes the prefilter after everything has stopped; what is planned from now on has to
+    /// be planned with the robot that has it.
+    ///
+    /// `false` if the look-ahead is full.
+    pub fn change_prefilter(&mut self, kernel: &Kernel) -> bool {
+        let queued = self.queue.push_kernel(kernel.clone());
+        if queued {
+            self.reset();
         }
-        self.segments.enqueue(segment).is_ok()
+        queued
     }
 
-    /// How long the raw path stands at a corner.
+    /// Queues what comes after an exact stop; the path goes on from rest.
+    fn push_stopped(&mut self, item: RawItem) -> bool {
+        let queued = self.queue.push(item);
+        if queued {
+            self.reset();
+        }
+        queued
+    }
+
+    /// How a segment follows the one before at a corner.
     fn corner(
         &mut self,
         robot: &Robot,
         arriving: &Side,
         leaving: &Side,
         tolerance_mm: f32,
-    ) -> TickTime {
+    ) -> Joint {
         let turns_only = arriving.feed_mm_s == 0.0 || leaving.feed_mm_s == 0.0;
         let usable_mm = if turns_only { 0.0 } else { tolerance_mm };
         let corner = solve_sampled(robot, arriving, leaving, usable_mm);
-        let settled = tick_time(robot.prefilter.length_s());
-        let mut dwell = if corner.cornering_s > 0.0 {
-            settled - tick_time(f64::from(corner.cornering_s)).min(settled)
-        } else {
-            robot.kernel.stop_time(self.since_tick)
-        };
+        let settled = robot.kernel.length();
+        let mut dwell = settled - tick_time(f64::from(corner.cornering_s)).min(settled);
         let turn = turn(arriving, leaving);
         let own = Blend {
             // an arc keeps its filter until that has settled to the last bit
@@ -184,11 +237,15 @@ impl<'q> Schedule<'q> {
             dwell = dwell.max(oldest.ends);
             self.blends.pop_front();
         }
+        let alone = self.blends.is_empty();
         if dwell < settled {
             // there is room: a full deque has given up its oldest
             let _ = self.blends.push_back(own);
         }
-        dwell
+        Joint {
+            overlap: (settled - dwell).max(0),
+            alone,
+        }
     }
 
     /// Whether a further corner and those being rounded keep the smallest tolerance.

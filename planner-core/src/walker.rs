@@ -1,8 +1,10 @@
 //! The raw path, walked in time: constant feedrate, standing still at corners.
 
 use crate::pose::AXES;
+use crate::prefilter::Kernel;
+use crate::queue::{Action, RawItem, SegmentConsumer};
 use crate::rate::Rate;
-use crate::raw::{Bow, ONE_TICK, RawSegment, SegmentConsumer, TickTime, WHOLE};
+use crate::raw::{Bow, ONE_TICK, Pace, RawSegment, TickTime, WHOLE};
 
 /// What the raw path did in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,19 +17,97 @@ pub struct RawStep<'s> {
     pub began: Option<&'s Bow>,
     /// Progress along the segment under way in 2^-30; 0 while standing.
     pub progress: i32,
-    /// Whether the raw point goes on moving after this tick.
+    /// Whether the raw point is moving after this tick.
     pub moves: bool,
+}
+
+/// The rates that the raw path is walked at.
+#[derive(Clone, Copy, Debug)]
+pub struct Rates {
+    /// Of moves at a feedrate.
+    pub feed: Rate,
+    /// Of rapids.
+    pub rapid: Rate,
+}
+
+impl Rates {
+    fn of(&self, segment: &RawSegment) -> Rate {
+        match segment.pace {
+            Pace::Feed => self.feed,
+            Pace::Rapid => self.rapid,
+            Pace::StandStill => Rate::ONE,
+        }
+    }
 }
 
 /// The state of the walk.
 #[derive(Clone, Copy, Debug)]
 enum Walk {
-    /// The raw point stands at the end of the last segment, for `stood` so far. It goes on
-    /// when the next segment is there and its dwell is over.
-    Standing { stood: TickTime },
-    /// On the first segment of the queue, with `remaining` of raw time to go. Goes over to
-    /// standing at its end, and the queue to the next segment.
-    Moving { progress: u64, remaining: TickTime },
+    /// The raw point stands. It goes on when the next segment is there and its dwell is over.
+    Standing(Stand),
+    /// On the first segment of the queue. Goes over to standing at its end, and the queue to
+    /// the next item.
+    Moving(Way),
+}
+
+/// At the end of a segment.
+#[derive(Clone, Copy, Debug)]
+struct Stand {
+    /// For so long.
+    time: TickTime,
+    /// For at least so long, until the corner behind that segment is done.
+    least: TickTime,
+    /// The highest rate at which that segment was walked, at least 1.
+    fastest: Rate,
+}
+
+impl Stand {
+    /// Everything has come to rest long ago.
+    const AT_REST: Self = Self {
+        time: TickTime::MAX,
+        least: 0,
+        fastest: Rate::ONE,
+    };
+
+    /// How much longer to stand before a segment that is walked at up to `licence`, when
+    /// `left` of the tick is left.
+    fn wait(&self, kernel: &Kernel, next: &RawSegment, licence: Rate, left: TickTime) -> TickTime {
+        let fastest = self.fastest.max(licence);
+        let overlap = if fastest > Rate::ONE {
+            fastest.real(next.overlap) - ONE_TICK
+        } else {
+            next.overlap
+        };
+        let dwell = if overlap > 0 {
+            kernel.length() - overlap
+        } else {
+            let since_arrival = self.time.wrapping_add(left);
+            kernel.stop_time(since_arrival & (ONE_TICK - 1))
+        };
+        dwell.max(self.least).saturating_sub(self.time).max(0)
+    }
+}
+
+/// Along a segment.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    progress: u64,
+    /// Raw time to go.
+    remaining: TickTime,
+    /// Real time since the raw point arrived at the corner before the segment.
+    since_corner: TickTime,
+    /// The highest rate that the corner before the segment allows for, at least 1.
+    licence: Rate,
+}
+
+impl Way {
+    /// The rate of the moment.
+    fn rate(&mut self, kernel: &Kernel, segment: &RawSegment, wanted: Rate) -> Rate {
+        if wanted > self.licence && self.since_corner >= kernel.settling_time() {
+            self.licence = wanted.min(segment.top_rate);
+        }
+        wanted.min(self.licence)
+    }
 }
 
 /// Walks the queued segments, one tick at a time.
@@ -35,133 +115,195 @@ enum Walk {
 /// Segments begin and end between ticks: what is left of a tick after a segment's end
 /// belongs to the dwell, and what is left of that to the next segment. A segment lasts at
 /// least one tick, so that a tick sees one end and one beginning at the most.
+///
+/// # Rates
+/// Raw time passes at a rate that may change with every tick: 0 in a hold, from 0.1 to 2 by an
+/// override. Dwells pass in real time. The prefilter follows as it follows every raw path, and
+/// the corners keep their tolerance:
+///
+/// **Up to 1.** With `a` the mean distance of the raw point before a corner and `b` that behind
+/// it, over the filter's window, the command is at `P_c − a u₁ + b u₂`. A lower rate and a
+/// longer dwell leave both `a` and `b` at most what they would have been at the same time
+/// after the arrival. `a` falls and `b` grows, so in the plane of `a` and `b` the curve runs
+/// below the planned one: on each ray from the corner it is nearer, and so are the closest
+/// approach and every distance from the path, which are proportional along a ray. Where
+/// several corners are being rounded, the schedule adds up the least of `a` and `b` of each,
+/// and those do not grow either; corners are done after the same time as planned.
+///
+/// **At k above 1** the feedrates grow by `k`, and the overlap shrinks to `t_c / k`. The ramp
+/// response `I` is convex and `I(0) = 0`, so `k F I(x / k) ≤ F I(x)`: again the curve runs below
+/// the planned one. A tick is taken off the overlap besides, because the margin for what the
+/// trace does within a tick grows with `k`. Segments then end sooner than the plan relied on,
+/// so this needs corners that are rounded alone:
+/// - a segment's `top_rate` is above 1 only if, at 1, the corner before it is done when the
+///   raw point arrives at the one behind it;
+/// - whatever its rate, the raw point waits there until that is so;
+/// - a segment that begins while other corners are being rounded is walked at up to 1 until
+///   they are done; the raw point has then fallen so far behind, standing for `T − t_c / k`,
+///   that no mean distance is larger than planned.
 pub struct Walker<'q> {
-    segments: SegmentConsumer<'q>,
+    queue: SegmentConsumer<'q>,
     walk: Walk,
     point: [i32; AXES],
-    rate: Rate,
+    rates: Rates,
+    held: bool,
 }
 
 impl<'q> Walker<'q> {
     /// A walker that stands at a point.
-    pub fn new(segments: SegmentConsumer<'q>, point: [i32; AXES]) -> Self {
+    pub fn new(queue: SegmentConsumer<'q>, point: [i32; AXES]) -> Self {
         Self {
-            segments,
-            walk: Walk::Standing {
-                stood: TickTime::MAX,
-            },
+            queue,
+            walk: Walk::Standing(Stand::AT_REST),
             point,
-            rate: Rate::ONE,
+            rates: Rates {
+                feed: Rate::ONE,
+                rapid: Rate::ONE,
+            },
+            held: false,
         }
     }
 
     /// Puts the raw point elsewhere, at rest.
     pub fn place(&mut self, point: [i32; AXES]) {
         self.point = point;
-        self.walk = Walk::Standing {
-            stood: TickTime::MAX,
-        };
+        self.walk = Walk::Standing(Stand::AT_REST);
+    }
+
+    /// Walks at these rates from now on.
+    pub fn set_rates(&mut self, rates: Rates) {
+        self.rates = rates;
     }
 
     /// Stands from now on, wherever the raw point is, or goes on.
     pub fn hold(&mut self, held: bool) {
-        self.rate = if held { Rate::ZERO } else { Rate::ONE };
+        self.held = held;
     }
 
-    /// Whether the raw point stands and no segment waits.
+    /// Whether the raw point stands and nothing waits.
     pub fn is_done(&self) -> bool {
-        matches!(self.walk, Walk::Standing { .. }) && !self.segments.ready()
+        matches!(self.walk, Walk::Standing(_)) && self.queue.is_empty()
     }
 
-    /// Forgets the oldest segments, `count` at the most; `true` if none is left.
-    pub fn forget(&mut self, count: usize) -> bool {
-        for _ in 0..count {
-            self.segments.dequeue();
+    /// The action at the point to which the raw path has come, if there is one, now that
+    /// everything stands.
+    pub fn take_action(&mut self) -> Option<Action> {
+        if matches!(self.walk, Walk::Moving(_)) {
+            return None;
         }
-        !self.segments.ready()
+        let action = self.queue.action()?;
+        self.queue.pop();
+        self.walk = Walk::Standing(Stand::AT_REST);
+        Some(action)
+    }
+
+    /// Forgets the oldest item; the raw point has to stand.
+    pub fn forget(&mut self) -> Option<RawItem> {
+        self.queue.pop()
+    }
+
+    /// The kernel that goes with [`Action::Prefilter`].
+    pub fn take_kernel(&mut self) -> Option<Kernel> {
+        self.queue.pop_kernel()
     }
 
     /// Walks on for one tick. An arc begins only where `arc_may_begin`.
-    pub fn step(&mut self, arc_may_begin: bool) -> RawStep<'_> {
+    pub fn step(&mut self, kernel: &Kernel, arc_may_begin: bool) -> RawStep<'_> {
         let mut left = ONE_TICK;
-        let ended = self.finish(&mut left);
-        let began = self.begin(&mut left, arc_may_begin);
-        let progress = self.advance(left);
-        let moves = matches!(self.walk, Walk::Moving { .. }) && self.rate != Rate::ZERO;
-        let bow = self.head().and_then(|segment| segment.bow.as_ref());
+        let ended = self.finish(kernel, &mut left);
+        let began = self.begin(kernel, &mut left, arc_may_begin);
+        let progress = self.advance(kernel, left);
+        let under_way = match self.walk {
+            Walk::Moving(_) => self.queue.segment(),
+            Walk::Standing(_) => None,
+        };
+        let bow = under_way.and_then(|segment| segment.bow.as_ref());
         RawStep {
             chord: self.point,
             ended,
             began: bow.filter(|_| began),
             progress,
-            moves,
+            moves: !self.held && under_way.is_some_and(|under_way| under_way.moves()),
         }
-    }
-
-    /// The first segment of the queue.
-    fn head(&self) -> Option<&RawSegment> {
-        self.segments.peek()
     }
 
     /// Ends the segment under way if it ends within what is `left` of the tick.
-    fn finish(&mut self, left: &mut TickTime) -> bool {
-        match self.walk {
-            Walk::Moving { remaining, .. } if self.rate != Rate::ZERO => {
-                let within = self.rate.raw(*left);
-                if remaining > within {
-                    return false;
-                }
-                *left = self.rate.real(within - remaining);
-                if let Some(segment) = self.segments.peek() {
-                    self.point = segment.target;
-                }
-                self.segments.dequeue();
-                self.walk = Walk::Standing { stood: 0 };
-                true
-            }
-            _ => false,
+    fn finish(&mut self, kernel: &Kernel, left: &mut TickTime) -> bool {
+        let (Walk::Moving(way), Some(segment), false) =
+            (&mut self.walk, self.queue.segment(), self.held)
+        else {
+            return false;
+        };
+        let rate = way.rate(kernel, segment, self.rates.of(segment));
+        let within = rate.raw(*left);
+        if way.remaining > within {
+            return false;
         }
+        let unused = rate.real(within - way.remaining);
+        let since_corner = way.since_corner.saturating_add(*left - unused);
+        *left = unused;
+        self.point = segment.target;
+        self.walk = Walk::Standing(if segment.moves() {
+            Stand {
+                time: 0,
+                least: if segment.top_rate > Rate::ONE {
+                    kernel.settling_time() - since_corner
+                } else {
+                    0
+                },
+                fastest: way.licence,
+            }
+        } else {
+            Stand::AT_REST
+        });
+        self.queue.pop();
+        true
     }
 
     /// Begins the next segment if its dwell ends within what is `left` of the tick, else
     /// stands on.
-    fn begin(&mut self, left: &mut TickTime, arc_may_begin: bool) -> bool {
-        let Walk::Standing { stood } = &mut self.walk else {
+    fn begin(&mut self, kernel: &Kernel, left: &mut TickTime, arc_may_begin: bool) -> bool {
+        let Walk::Standing(stand) = &mut self.walk else {
             return false;
         };
-        let next = self.segments.peek().filter(|_| self.rate != Rate::ZERO);
+        let next = self.queue.segment().filter(|_| !self.held);
         let next = next.filter(|next| arc_may_begin || next.bow.is_none());
         if let Some(next) = next {
-            let wait = next.dwell.saturating_sub(*stood).max(0);
+            let top_rate = if next.begins_alone {
+                next.top_rate
+            } else {
+                Rate::ONE
+            };
+            let licence = self.rates.of(next).min(top_rate).max(Rate::ONE);
+            let wait = stand.wait(kernel, next, licence, *left);
             if wait < *left {
                 *left -= wait;
-                self.walk = Walk::Moving {
+                self.walk = Walk::Moving(Way {
                     progress: 0,
                     remaining: next.duration,
-                };
+                    since_corner: stand.time.saturating_add(wait),
+                    licence,
+                });
                 return true;
             }
         }
-        *stood = stood.saturating_add(*left);
+        stand.time = stand.time.saturating_add(*left);
         false
     }
 
     /// Moves along the segment under way for what is `left` of the tick.
-    fn advance(&mut self, left: TickTime) -> i32 {
-        let share = self.rate.raw(left);
-        let (
-            Walk::Moving {
-                progress,
-                remaining,
-            },
-            Some(segment),
-        ) = (&mut self.walk, self.segments.peek())
-        else {
+    fn advance(&mut self, kernel: &Kernel, left: TickTime) -> i32 {
+        let (Walk::Moving(way), Some(segment)) = (&mut self.walk, self.queue.segment()) else {
             return 0;
         };
-        *progress = progress.wrapping_add(part_of_tick(segment.rate, share));
-        *remaining -= share;
-        let so_far = ((*progress).min(WHOLE) >> 32) as i32;
+        if !self.held {
+            let rate = way.rate(kernel, segment, self.rates.of(segment));
+            let share = rate.raw(left);
+            way.progress = way.progress.wrapping_add(part_of_tick(segment.rate, share));
+            way.remaining -= share;
+        }
+        way.since_corner = way.since_corner.saturating_add(left);
+        let so_far = (way.progress.min(WHOLE) >> 32) as i32;
         self.point = segment.chord_point(so_far);
         so_far
     }

@@ -15,7 +15,7 @@ use planner_core::gcode::{Defaults, Interpreter, Line};
 use planner_core::motion::{DelayLines, Motion, MotionState, Order};
 use planner_core::planner::Planner;
 use planner_core::prefilter::{Kind, PrefilterConfig};
-use planner_core::raw::SegmentQueue;
+use planner_core::queue::SegmentQueue;
 use static_cell::ConstStaticCell;
 
 /// The corner path, arcs in a row with a helix and yaw, and half-millimetre segments.

@@ -1,12 +1,14 @@
 //! The command task: carries out what the core's controller decides.
 
-use embassy_time::{Duration, Instant, Timer, with_deadline};
+use embassy_time::{Duration, Instant, with_deadline};
 use planner_core::config::Robot;
-use planner_core::protocol::inbox::READ_BYTES;
 use planner_core::protocol::{Controller, Step};
 
 use crate::board::{ByteIn, ByteOut};
 use crate::tasks::link::Link;
+
+/// Bytes taken from the port at once.
+const READ_BYTES: usize = 64;
 
 /// Everything between the command port and the control task.
 pub struct Commands<I, O> {
@@ -49,9 +51,7 @@ pub async fn run(commands: Commands<impl ByteIn, impl ByteOut>) -> ! {
             }
         }
         link.set_program_open(controller.program_is_open());
-        if !controller.has_room() {
-            Timer::at(wake).await;
-        } else if let Ok(count) = with_deadline(wake, input.read(&mut bytes)).await {
+        if let Ok(count) = with_deadline(wake, input.read(&mut bytes)).await {
             let now_ms = Instant::now().as_millis();
             for &byte in bytes.iter().take(count) {
                 controller.receive(byte, now_ms);

@@ -53,7 +53,7 @@ struct BuildInfo {
 #[derive(Clone, Debug)]
 pub struct EmulatorRun {
     /// From the first running tick to the one that found the motion at rest,
-    /// contiguous; one frame if nothing moved.
+    /// contiguous but for pauses; one frame if nothing moved.
     pub setpoints: Vec<SetpointFrame>,
     /// Instructions of the dearest of these ticks.
     pub worst_tick_instructions: u32,
@@ -83,8 +83,8 @@ impl Emulator {
     pub fn start_at(image: &Path, pace: Pace) -> Result<Self, EmulatorError> {
         let (qemu, [commands, setpoints]) = Qemu::boot(image, pace)?;
         let mut emulator = Self {
+            setpoints: SetpointPort::new(setpoints, commands.try_clone()?),
             commands: CommandPort::new(commands)?,
-            setpoints: SetpointPort::new(setpoints),
             rx_bytes: 0,
             qemu,
         };
@@ -94,7 +94,8 @@ impl Emulator {
     }
 
     /// Sends settings (`name=value`) and a program, a line each, and waits until the
-    /// motion has come to rest. A program without an end of its own gets an `M2`.
+    /// motion has come to rest. A program without an end of its own gets an `M2`; a pause
+    /// (M0) is resumed at once.
     pub fn run_program(
         &mut self,
         settings: &[String],
@@ -107,6 +108,7 @@ impl Emulator {
         }
         let before = self.statistics()?;
         self.setpoints.forget();
+        self.setpoints.resume_pauses(true);
         self.stream(lines)?;
         if !lines.iter().rev().any(|line| ends_program(line)) {
             let answer = self.ask(b"M2")?;
@@ -115,6 +117,7 @@ impl Emulator {
         while self.status()?.split('|').next() != Some("Idle") {
             thread::sleep(STATUS_POLL);
         }
+        self.setpoints.resume_pauses(false);
         let after = self.statistics()?;
         let frames = self.setpoints.until(after.count.wrapping_sub(1))?;
         let (lost, bad) = self.setpoints.damage();
@@ -275,12 +278,16 @@ fn ends_program(line: &str) -> bool {
         .any(|end| code.eq_ignore_ascii_case(end))
 }
 
-/// From the first running frame to the first idle one after the last running one;
-/// if none runs, the last.
+/// From the first running frame to the first idle one after the last running one, without
+/// pauses; if none runs, the last.
 fn motion_of(frames: &[SetpointFrame]) -> Vec<SetpointFrame> {
     let runs = |frame: &SetpointFrame| frame.setpoint.state != MotionState::Idle;
     match (frames.iter().position(runs), frames.iter().rposition(runs)) {
-        (Some(first), Some(last)) => frames[first..frames.len().min(last + 2)].to_vec(),
+        (Some(first), Some(last)) => frames[first..frames.len().min(last + 2)]
+            .iter()
+            .filter(|frame| frame.setpoint.state != MotionState::Paused)
+            .copied()
+            .collect(),
         _ => frames.last().copied().into_iter().collect(),
     }
 }

@@ -20,7 +20,7 @@ use planner_core::config::{Robot, RobotConfig};
 use planner_core::kinematics::Elbow;
 use planner_core::motion::{DelayLines, MotionState, Setpoint};
 use planner_core::prefilter::Kind;
-use planner_core::raw::{LOOKAHEAD, SegmentQueue};
+use planner_core::queue::{LOOKAHEAD, SegmentQueue};
 use planner_core::units::{AngleDeg, AngleRad, LengthMm};
 
 const CORNER_PATH: &str = include_str!("../../programs/corner-path.gcode");

@@ -57,7 +57,7 @@ const COMMANDS: &[Row] = &[
     row("G19", "plane YZ", &["G19"], "$G", &["G19", "ok"]),
     row("G20", "inches", &[AT, "G20"], "G0 X8 @stop", &["ok", "MPos:203.200"]),
     row("G21", "millimetres", &["G20", "G21"], "$G", &["G21", "ok"]),
-    row("G28", "to the stored position, through a point", &[AT, "G28.1", "G0 X220 Y10"], "G28 X210 @stop", &["ok", "MPos:200.000,0.000"]),
+    row("G28", "to the stored position, through a point", &[AT, "G28.1", "G0 X220 Y10"], "G28 X210 @stop", &["ok", "MPos:200.000,10.000"]),
     row("G28.1", "stores the position", &[AT, "G28.1"], "$#", &["[G28:200.000,0.000,0.000", "ok"]),
     row("G30", "to the other stored position", &[AT, "G30.1", "G0 X220"], "G30 @stop", &["ok", "MPos:200.000,0.000"]),
     row("G30.1", "stores the other position", &[AT, "G30.1"], "$#", &["[G30:200.000,0.000,0.000", "ok"]),
@@ -93,7 +93,7 @@ const COMMANDS: &[Row] = &[
     row("M30", "end of program", &["G91", "M30"], "$G", &["G90", "ok"]),
     row("M100", "prefilter, by number, frequency and damping", THERE, "M100 P1 Q10 R0.01", &["ok"]),
     row("M102", "right elbow", THERE, "M102", &["ok"]),
-    row("N… *…", "line number and checksum", NONE, "N1 G21*100", &["ok"]),
+    row("N… *…", "line number and checksum", NONE, "N1 G21*27", &["ok"]),
     row("empty line", "is answered", NONE, "", &["ok"]),
     row("( ) and ;", "comments", NONE, "(a comment) G21 ; another", &["ok"]),
     row("$", "help", NONE, "$", &["[HLP:", "ok"]),
@@ -148,14 +148,14 @@ const REFUSALS: &[Row] = &[
     row("error:3", "", NONE, "$nothing", &["error:3"]),
     row("error:4", "", NONE, "F-1", &["error:4"]),
     row("error:5", "", NONE, "$H", &["error:5"]),
-    row("error:7", "", &["@broken store"], "$11=0.25", &["[MSG:", "ok"]),
+    row("error:7", "", &["@broken store"], "$11=0.25", &["[MSG:", "error:7"]),
     row("error:8", "", &[AT, "G1 X300 F600", "@wait 500"], "$$", &["error:8"]),
     row("error:9", "", &[AT, "@reset in motion"], "G0 X210", &["error:9"]),
     row("error:10", "", NONE, "$20=1", &["error:10"]),
     row("error:11", "", NONE, "@long", &["error:11"]),
     row("error:14", "", NONE, "@long startup", &["error:14"]),
     row("error:15", "", THERE, "$J=X1000 F600", &["error:15"]),
-    row("error:16", "", THERE, "$J=X210", &["error:16"]),
+    row("error:16", "", THERE, "$J=X210 F600 M3", &["error:16"]),
     row("error:20", "", NONE, "G5", &["error:20"]),
     row("error:21", "", NONE, "G0 G1", &["error:21"]),
     row("error:22", "", THERE, "G1 X210", &["error:22"]),
@@ -181,8 +181,8 @@ const REFUSALS: &[Row] = &[
     row("error:63", "", NONE, "N1 G21*0", &["error:63"]),
     row("error:64", "", NONE, "@many words", &["error:64"]),
     row("error:66", "", &["$error-safe=1", "G5"], "G21", &["error:66"]),
-    row("error:67", "", &["N1 G21*100"], "N9 G21*108", &["error:67"]),
-    row("error:70", "", THERE, "G0 X1000", &["error:70"]),
+    row("error:67", "", &["N1 G21*27"], "N9 G21*19", &["error:67"]),
+    row("error:70", "", NONE, "G0 X1000 Y0", &["error:70"]),
     row("error:71", "", THERE, "G0 X349.9", &["error:71"]),
     row("error:72", "", THERE, "G0 Z250", &["error:72"]),
     row("error:73", "", THERE, "G1 X300 F0.0001", &["error:73"]),
@@ -194,7 +194,7 @@ const REFUSALS: &[Row] = &[
 
 const ALARMS: &[Row] = &[
     row("ALARM:1", "", &["$21=1", AT, "G1 X300 F6000", "@wait 500"], "@limit 1500", &["ALARM:1", "[MSG:Reset to continue]", "<Alarm|"]),
-    row("ALARM:2", "", &["@encoders", "$1000=1", "$20=1", "$H"], "G0 X1000 @stop", &["error:70", "ALARM:2", "[MSG:Reset to continue]", "<Alarm|"]),
+    row("ALARM:2", "", &["@encoders", "$1000=1", "$20=1", "$H"], "G0 X1000 @stop", &["error:71", "ALARM:2", "[MSG:Reset to continue]", "<Alarm|"]),
     row("ALARM:3", "", &[AT], "@reset in motion", &["ALARM:3", "Grbl 1.1h", "[MSG:'$H'|'$X' to unlock]", "<Alarm|"]),
 ];
 
@@ -272,6 +272,7 @@ fn send(desk: &mut SerialLoop<'_>, item: &str) -> String {
         }
         ("encoders", _) => {
             desk.encoders = Some(desk.joints_at(200.0, 0.0));
+            desk.run_ms(2);
             String::new()
         }
         ("broken", _) => {
@@ -279,7 +280,7 @@ fn send(desk: &mut SerialLoop<'_>, item: &str) -> String {
             String::new()
         }
         ("long", "") => desk.ask(&format!("G0 {}", "X1".repeat(300))),
-        ("long", _) => desk.ask(&format!("$N0={}", "G21 ".repeat(30))),
+        ("long", _) => desk.ask(&format!("$N0=G21 ({})", "x".repeat(90))),
         ("many", _) => desk.ask(&"X1".repeat(40)),
         other => panic!("no such item: {other:?}"),
     }

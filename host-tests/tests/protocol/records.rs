@@ -20,7 +20,7 @@ fn everything_comes_back_after_a_restart() {
         "$prefilter=zv",
         "$N0=G20",
         "$I=left cell",
-        "G0 X10 Y0",
+        "G0 X250 Y0",
         "G10 L2 P3 X1 Y2 Z3 C4",
         "G28.1",
     ];
@@ -38,7 +38,7 @@ fn everything_comes_back_after_a_restart() {
     ]) {
         assert!(answer.contains(part), "{part}: {answer}");
     }
-    assert!(heard[5].contains("[G28:254.000"), "{}", heard[5]);
+    assert!(heard[5].contains("[G28:250.000"), "{}", heard[5]);
 }
 
 #[test]

@@ -128,6 +128,17 @@ impl Wishes {
     };
 }
 
+/// Where numbered lines with checksums have come to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sequence {
+    /// Lines carry no checksums, or none has come yet: the first says where they begin.
+    Off,
+    /// The last line that came whole has this number.
+    At(i32),
+    /// A reset came in between: M110 has to say where they go on.
+    Lost,
+}
+
 /// Serves one command link.
 ///
 /// Bytes go in with [`Controller::receive`]; [`Controller::step`] says, one thing at a time,
@@ -155,8 +166,7 @@ pub struct Controller<'q> {
     has_line_numbers: bool,
     /// After an error, in error-safe streaming: until `$ACK`.
     is_refusing: bool,
-    /// Number of the last line that came whole, once lines carry checksums.
-    sequence: Option<i32>,
+    sequence: Sequence,
     /// The next start-up line to execute.
     startup: Option<u8>,
     startup_lines: [KeptText; 2],
@@ -200,7 +210,7 @@ impl<'q> Controller<'q> {
             program_open: false,
             has_line_numbers: false,
             is_refusing: false,
-            sequence: None,
+            sequence: Sequence::Off,
             startup: None,
             startup_lines: [KeptText::new(), KeptText::new()],
             build_name: KeptText::new(),
@@ -217,7 +227,10 @@ impl<'q> Controller<'q> {
     /// Number of the last line with a checksum that was accepted, 0 if there is none.
     #[must_use]
     pub fn last_line(&self) -> i32 {
-        self.sequence.unwrap_or(0)
+        match self.sequence {
+            Sequence::At(number) => number,
+            Sequence::Off | Sequence::Lost => 0,
+        }
     }
 
     /// The robot that planning uses, after [`Step::Robot`].
@@ -230,12 +243,6 @@ impl<'q> Controller<'q> {
     #[must_use]
     pub const fn program_is_open(&self) -> bool {
         self.program_open
-    }
-
-    /// Whether [`inbox::READ_BYTES`] more bytes may be received.
-    #[must_use]
-    pub fn has_room(&self) -> bool {
-        self.inbox.has_room()
     }
 
     /// Takes a byte of the link. Realtime commands take effect at once.
@@ -487,7 +494,9 @@ impl Controller<'_> {
         let in_motion = !self.is_at_rest(report);
         self.forget_answers();
         self.is_refusing = false;
-        self.sequence = None;
+        if self.sequence != Sequence::Off {
+            self.sequence = Sequence::Lost;
+        }
         self.has_line_numbers = false;
         if self.rates != Rates::FULL {
             self.rates = Rates::FULL;
@@ -677,7 +686,7 @@ impl Controller<'_> {
                 machine_position: protocol.report_mask & 1 != 0,
                 inches: protocol.report_inches,
                 buffers: has_buffers.then(|| (self.planner.free_places(), self.inbox.free_bytes())),
-                line: self.has_line_numbers.then_some(report.setpoint.line),
+                line: None,
                 speed_mm_s: report.speed_mm_s(),
                 inputs: report.inputs,
                 outputs: report.setpoint.outputs,
@@ -700,8 +709,13 @@ impl Controller<'_> {
         let Some(first) = self.inbox.first_byte() else {
             return false;
         };
-        // Questions are answered while moves wait for room.
-        if first != b'$' && !self.planner.has_room() {
+        // Questions are answered while moves wait for room, once the report is one of after
+        // the last order: whether the robot is at rest may matter.
+        let may_be_taken = match first {
+            b'$' => report.orders == self.orders,
+            _ => self.planner.has_room(),
+        };
+        if !may_be_taken {
             return false;
         }
         match self.inbox.pop() {
@@ -805,30 +819,30 @@ impl Controller<'_> {
     fn in_sequence(&mut self, line: &Line) -> Result<bool, Refusal> {
         let number = line.number().filter(|_| line.has_checksum());
         match (self.sequence, number) {
-            (None, None) => Ok(true),
+            (Sequence::Off, None) => return Ok(true),
             // A line without checksum among lines with one has lost it.
-            (Some(_), None) => Err(Refusal::OutOfOrder),
-            (_, Some(number)) if line.sets_number() => {
-                self.sequence = Some(number);
-                Ok(true)
+            (_, None) => return Err(Refusal::OutOfOrder),
+            (_, Some(_)) if line.sets_number() => {}
+            (Sequence::Off, Some(_)) => {}
+            (Sequence::Lost, Some(_)) => return Err(Refusal::OutOfOrder),
+            (Sequence::At(last), Some(number)) if number <= last => return Ok(false),
+            (Sequence::At(last), Some(number)) if number > last.wrapping_add(1) => {
+                return Err(Refusal::OutOfOrder);
             }
-            (None, Some(number)) => {
-                self.sequence = Some(number);
-                Ok(true)
-            }
-            (Some(last), Some(number)) if number == last.wrapping_add(1) => {
-                self.sequence = Some(number);
-                Ok(true)
-            }
-            (Some(last), Some(number)) if number <= last => Ok(false),
-            (Some(_), Some(_)) => Err(Refusal::OutOfOrder),
+            (Sequence::At(_), Some(_)) => {}
         }
+        if let Some(number) = number {
+            self.sequence = Sequence::At(number);
+        }
+        Ok(true)
     }
 
     /// Says from where to send again.
     fn say_next_number(&mut self) {
-        if let Some(last) = self.sequence {
-            self.out(Out::NextIs(last.wrapping_add(1)));
+        match self.sequence {
+            Sequence::Off => {}
+            Sequence::At(last) => self.out(Out::NextIs(last.wrapping_add(1))),
+            Sequence::Lost => self.out(Out::Message("Send M110 first")),
         }
     }
 
@@ -1099,10 +1113,12 @@ impl Controller<'_> {
         }
     }
 
-    /// Whether what was to be kept is kept.
+    /// Whether what was to be kept is kept; if not, the line's answer becomes `error:7`.
     pub fn kept(&mut self, is_kept: bool) {
-        if !is_kept {
-            self.out(Out::Sentence(Refusal::NotStored));
+        if !is_kept && self.outs.front() == Some(&Out::Ok) {
+            self.outs.pop_front();
+            let _ = self.outs.push_front(Out::Error(Refusal::NotStored.code()));
+            let _ = self.outs.push_front(Out::Sentence(Refusal::NotStored));
         }
     }
 

@@ -15,19 +15,15 @@ pub const LINE_BYTES: usize = 254;
 
 const OVERFLOW: u8 = u8::MAX;
 
-/// Bytes that may be taken from the port at once, if [`Inbox::has_room`].
-pub const READ_BYTES: usize = 64;
-
-/// What one reading can add: a line that was almost complete, and shorter ones.
-const RESERVE: usize = LINE_BYTES + 1 + READ_BYTES;
-
+/// Room for lines.
+///
 /// What a sender may have under way always fits: a line's end becomes its length.
-const CAPACITY: usize = RX_BYTES + RESERVE;
+const CAPACITY: usize = RX_BYTES + LINE_BYTES + 1;
 
 /// A line as received, without its end.
 pub type Line = heapless::Vec<u8, LINE_BYTES>;
 
-/// The mark of a line that did not fit.
+/// The mark of a line that was too long, or that came while there was no room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLong;
 
@@ -35,6 +31,9 @@ pub struct TooLong;
 #[derive(Debug, Default)]
 pub struct Inbox {
     records: Deque<u8, CAPACITY>,
+    /// Lines that found no room, behind those that did: the sender ignores the flow control,
+    /// and realtime bytes must get through nevertheless.
+    lost: u32,
 }
 
 impl Inbox {
@@ -43,20 +42,14 @@ impl Inbox {
     pub const fn new() -> Self {
         Self {
             records: Deque::new(),
+            lost: 0,
         }
-    }
-
-    /// Whether another reading would fit. If not, the sender ignores the flow
-    /// control, and its bytes have to wait in the port.
-    #[must_use]
-    pub fn has_room(&self) -> bool {
-        self.records.len() + RESERVE <= CAPACITY
     }
 
     /// Whether no line waits.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.records.is_empty()
+        self.records.is_empty() && self.lost == 0
     }
 
     /// Room in bytes, as the status reports it.
@@ -65,39 +58,57 @@ impl Inbox {
         RX_BYTES.saturating_sub(self.records.len())
     }
 
-    /// Appends a line; after a reading, for which there was room.
+    /// Appends a line.
     pub fn push(&mut self, line: &[u8]) {
-        match u8::try_from(line.len()) {
-            Ok(length) if length != OVERFLOW => {
-                let _ = self.records.push_back(length);
-                for &byte in line {
-                    let _ = self.records.push_back(byte);
-                }
+        let length = u8::try_from(line.len()).unwrap_or(OVERFLOW);
+        if length == OVERFLOW {
+            self.push_too_long();
+        } else if self.has_room_for(line.len()) {
+            let _ = self.records.push_back(length);
+            for &byte in line {
+                let _ = self.records.push_back(byte);
             }
-            _ => self.push_too_long(),
+        } else {
+            self.lost = self.lost.saturating_add(1);
         }
     }
 
-    /// Appends the mark of a line that was too long; likewise.
+    /// Appends the mark of a line that was too long.
     pub fn push_too_long(&mut self) {
-        let _ = self.records.push_back(OVERFLOW);
+        if self.has_room_for(0) {
+            let _ = self.records.push_back(OVERFLOW);
+        } else {
+            self.lost = self.lost.saturating_add(1);
+        }
+    }
+
+    /// Whether a line of so many bytes fits, and none before it is lost.
+    fn has_room_for(&self, length: usize) -> bool {
+        self.lost == 0 && self.records.len() + 1 + length <= CAPACITY
     }
 
     /// The first byte of the oldest line, 0 of an empty or lost one.
     #[must_use]
     pub fn first_byte(&self) -> Option<u8> {
         let mut bytes = self.records.iter();
-        match bytes.next()? {
-            0 | &OVERFLOW => Some(0),
-            _ => bytes.next().copied(),
+        match bytes.next() {
+            None if self.lost > 0 => Some(0),
+            None => None,
+            Some(&(0 | OVERFLOW)) => Some(0),
+            Some(_) => bytes.next().copied(),
         }
     }
 
     /// The oldest line.
     pub fn pop(&mut self) -> Option<Result<Line, TooLong>> {
-        match self.records.pop_front()? {
-            OVERFLOW => Some(Err(TooLong)),
-            length => {
+        match self.records.pop_front() {
+            None if self.lost > 0 => {
+                self.lost -= 1;
+                Some(Err(TooLong))
+            }
+            None => None,
+            Some(OVERFLOW) => Some(Err(TooLong)),
+            Some(length) => {
                 let bytes = (0..length).filter_map(|_| self.records.pop_front());
                 Some(Ok(bytes.collect()))
             }
@@ -107,6 +118,7 @@ impl Inbox {
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.records.clear();
+        self.lost = 0;
     }
 }
 
@@ -135,10 +147,25 @@ mod tests {
         let mut inbox = Inbox::new();
         let mut announced = 0;
         while announced + LINE_BYTES < RX_BYTES {
-            assert!(inbox.has_room());
             inbox.push(&[b'x'; LINE_BYTES]);
             announced += LINE_BYTES + 1;
         }
-        assert!(inbox.has_room());
+        inbox.push(&[b'y'; 10]);
+        assert!(core::iter::from_fn(|| inbox.pop()).all(|line| line.is_ok()));
+    }
+
+    #[test]
+    fn lines_without_room_are_answered_too_and_behind_the_others() {
+        let mut inbox = Inbox::new();
+        for _ in 0..1000 {
+            inbox.push(b"G1 X1");
+        }
+        let kept = core::iter::from_fn(|| inbox.pop().filter(|line| line.is_ok())).count();
+        assert!(kept * 6 > RX_BYTES);
+        inbox.push(b"G1 X2");
+        let lost = core::iter::from_fn(|| inbox.pop()).take_while(|line| line.is_err());
+        assert_eq!(lost.count(), 1000 - kept);
+        inbox.push(b"G1 X3");
+        assert_eq!(inbox.pop().unwrap().as_deref(), Ok(b"G1 X3".as_slice()));
     }
 }

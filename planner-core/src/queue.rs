@@ -1,0 +1,148 @@
+//! The look-ahead: what the planner hands to the tick, without locks.
+
+use heapless::spsc::{Consumer, Producer, Queue};
+
+use crate::prefilter::Kernel;
+use crate::raw::RawSegment;
+
+/// Segments and actions that can wait between the planner and the tick.
+///
+/// 64 segments of 0.5 mm at 160 mm/s last 0.2 s, longer than a serial line hesitates.
+pub const LOOKAHEAD: usize = 64;
+
+/// Changes of the prefilter that can wait: one that is about to happen and one more, because
+/// everything stands before each of them.
+pub const KERNELS: usize = 2;
+
+/// What the tick carries out, in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RawItem {
+    /// The raw path goes on.
+    Segment(RawSegment),
+    /// Something happens where the path has come to.
+    Action(Action),
+}
+
+/// What happens as soon as everything stands at a point of the path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// The digital outputs are switched: bit 0 the gripper, bit 1 the blow-off.
+    Outputs(u8),
+    /// The motion pauses until it is resumed.
+    Pause,
+    /// The oldest kernel that waits becomes the prefilter.
+    Prefilter,
+}
+
+/// The queue between planner and tick; one place stays empty to tell full from empty.
+#[derive(Default)]
+pub struct SegmentQueue {
+    items: Queue<RawItem, { LOOKAHEAD + 1 }>,
+    kernels: Queue<Kernel, { KERNELS + 1 }>,
+}
+
+impl SegmentQueue {
+    /// An empty queue.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            items: Queue::new(),
+            kernels: Queue::new(),
+        }
+    }
+
+    /// The planner's end and the tick's.
+    pub fn split(&mut self) -> (SegmentProducer<'_>, SegmentConsumer<'_>) {
+        let (items_in, items_out) = self.items.split();
+        let (kernels_in, kernels_out) = self.kernels.split();
+        (
+            SegmentProducer {
+                items: items_in,
+                kernels: kernels_in,
+            },
+            SegmentConsumer {
+                items: items_out,
+                kernels: kernels_out,
+            },
+        )
+    }
+}
+
+/// The planner's end of the queue.
+pub struct SegmentProducer<'q> {
+    items: Producer<'q, RawItem>,
+    kernels: Producer<'q, Kernel>,
+}
+
+impl SegmentProducer<'_> {
+    /// Items that can wait.
+    #[must_use]
+    pub fn capacity(&self) -> usize {
+        self.items.capacity()
+    }
+
+    /// Places for items that are free; none while a change of the prefilter finds no room.
+    #[must_use]
+    pub fn free_places(&self) -> usize {
+        if self.kernels.ready() {
+            self.items.capacity() - self.items.len()
+        } else {
+            0
+        }
+    }
+
+    /// Appends an item; `false` if there is no room.
+    pub fn push(&mut self, item: RawItem) -> bool {
+        self.items.enqueue(item).is_ok()
+    }
+
+    /// Appends a change of the prefilter; `false` if there is no room.
+    pub fn push_kernel(&mut self, kernel: Kernel) -> bool {
+        // The kernel first: the tick looks for it when it comes to the item.
+        self.free_places() > 0
+            && self.kernels.enqueue(kernel).is_ok()
+            && self.push(RawItem::Action(Action::Prefilter))
+    }
+}
+
+/// The tick's end of the queue.
+pub struct SegmentConsumer<'q> {
+    items: Consumer<'q, RawItem>,
+    kernels: Consumer<'q, Kernel>,
+}
+
+impl SegmentConsumer<'_> {
+    /// Whether nothing waits.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        !self.items.ready()
+    }
+
+    /// The oldest item, if it is a segment.
+    #[must_use]
+    pub fn segment(&self) -> Option<&RawSegment> {
+        match self.items.peek() {
+            Some(RawItem::Segment(segment)) => Some(segment),
+            Some(RawItem::Action(_)) | None => None,
+        }
+    }
+
+    /// The oldest item, if it is an action.
+    #[must_use]
+    pub fn action(&self) -> Option<Action> {
+        match self.items.peek() {
+            Some(&RawItem::Action(action)) => Some(action),
+            Some(RawItem::Segment(_)) | None => None,
+        }
+    }
+
+    /// Removes the oldest item.
+    pub fn pop(&mut self) -> Option<RawItem> {
+        self.items.dequeue()
+    }
+
+    /// The oldest kernel that waits.
+    pub fn pop_kernel(&mut self) -> Option<Kernel> {
+        self.kernels.dequeue()
+    }
+}
