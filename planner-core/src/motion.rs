@@ -109,15 +109,16 @@ pub struct Motion<'q> {
 /// What the motion is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
-    /// Nothing. To running by a start.
+    /// Nothing. To running by a start, to held by a hold.
     Idle,
     /// Walking the raw path. To idle when the queue has run dry and everything stands, to
-    /// paused when the path says so, to stopping by a hold or a stop.
+    /// paused when the path says so, to holding by a hold, to stopping by a stop.
     Running,
-    /// The raw path is held, the filters settle. Then to held, or to forgetting if it is a
-    /// stop; back to running by a resume.
-    Stopping { forget: bool },
-    /// Everything stands, on the path. To running by a resume.
+    /// The raw path is held, the filters settle. Then to held; to running by a resume.
+    Holding,
+    /// Likewise. Then to forgetting.
+    Stopping,
+    /// Everything stands, on the path. To running by a resume, to forgetting by a stop.
     Held,
     /// Likewise.
     Paused,
@@ -179,7 +180,7 @@ impl<'q> Motion<'q> {
         let stands = match self.mode {
             Mode::Idle => true,
             Mode::Held | Mode::Paused => self.walker.is_done(),
-            Mode::Running | Mode::Stopping { .. } | Mode::Forgetting => false,
+            Mode::Running | Mode::Holding | Mode::Stopping | Mode::Forgetting => false,
         };
         if stands {
             self.rest_at(pose.to_bits());
@@ -195,24 +196,24 @@ impl<'q> Motion<'q> {
     fn hold(&mut self) {
         match self.mode {
             Mode::Idle => self.mode = Mode::Held,
-            Mode::Running => self.mode = Mode::Stopping { forget: false },
-            Mode::Stopping { .. } | Mode::Held | Mode::Paused | Mode::Forgetting => {}
+            Mode::Running => self.mode = Mode::Holding,
+            Mode::Holding | Mode::Stopping | Mode::Held | Mode::Paused | Mode::Forgetting => {}
         }
     }
 
     fn resume(&mut self) {
         match self.mode {
-            Mode::Stopping { forget: false } | Mode::Held | Mode::Paused => {
-                self.mode = Mode::Running;
-            }
-            Mode::Idle | Mode::Running | Mode::Stopping { .. } | Mode::Forgetting => self.start(),
+            Mode::Idle => self.start(),
+            Mode::Holding | Mode::Held | Mode::Paused => self.mode = Mode::Running,
+            Mode::Running | Mode::Stopping | Mode::Forgetting => {}
         }
     }
 
     fn stop(&mut self) {
         match self.mode {
-            Mode::Running | Mode::Stopping { .. } => self.mode = Mode::Stopping { forget: true },
-            Mode::Idle | Mode::Held | Mode::Paused | Mode::Forgetting => self.forget(),
+            Mode::Running | Mode::Holding => self.mode = Mode::Stopping,
+            Mode::Idle | Mode::Held | Mode::Paused => self.forget(),
+            Mode::Stopping | Mode::Forgetting => {}
         }
     }
 
@@ -220,7 +221,7 @@ impl<'q> Motion<'q> {
     #[must_use]
     pub fn tick(&mut self) -> Setpoint {
         let newest = match self.mode {
-            Mode::Running | Mode::Stopping { .. } => self.command(),
+            Mode::Running | Mode::Holding | Mode::Stopping => self.command(),
             Mode::Idle | Mode::Held | Mode::Paused => self.history[1],
             Mode::Forgetting => {
                 self.forget_some();
@@ -259,7 +260,7 @@ impl<'q> Motion<'q> {
         match self.mode {
             Mode::Idle => MotionState::Idle,
             Mode::Running => MotionState::Running,
-            Mode::Stopping { .. } | Mode::Forgetting => MotionState::Stopping,
+            Mode::Holding | Mode::Stopping | Mode::Forgetting => MotionState::Stopping,
             Mode::Held => MotionState::Held,
             Mode::Paused => MotionState::Paused,
         }
@@ -289,8 +290,8 @@ impl<'q> Motion<'q> {
     fn come_to_rest(&mut self) {
         match self.mode {
             Mode::Running => self.act(),
-            Mode::Stopping { forget: false } => self.mode = Mode::Held,
-            Mode::Stopping { forget: true } => self.forget(),
+            Mode::Holding => self.mode = Mode::Held,
+            Mode::Stopping => self.forget(),
             Mode::Idle | Mode::Held | Mode::Paused | Mode::Forgetting => {}
         }
     }

@@ -34,17 +34,22 @@ impl Rate {
     /// The raw time that passes in a real time of up to a tick; exact at [`Rate::ONE`], else
     /// rounded down.
     pub fn raw(self, real: TickTime) -> TickTime {
+        if self == Self::ONE {
+            return real;
+        }
         (real * TickTime::from(self.0)) >> RATE_BITS
     }
 
-    /// The real time in which a raw time of up to 2^47 passes; exact at [`Rate::ONE`], else
-    /// rounded down. Zero at [`Rate::ZERO`], where it never does.
+    /// The real time in which a raw time passes, up to two ticks, or up to 2^14 ticks from
+    /// [`Rate::ONE`] on. Exact at [`Rate::ONE`], else rounded down by up to 2^-15 of it. Zero at
+    /// [`Rate::ZERO`], where it never does.
     pub fn real(self, raw: TickTime) -> TickTime {
         if self == Self::ONE {
             return raw;
         }
-        let scaled = (raw as u64) << RATE_BITS;
-        scaled.checked_div(u64::from(self.0)).unwrap_or(0) as TickTime
+        // 32 bits, because a division of 64 would cost as much as the rest of the walk
+        let inverse = u32::MAX.checked_div(self.0).unwrap_or(0);
+        (raw * TickTime::from(inverse)) >> RATE_BITS
     }
 }
 

@@ -62,21 +62,50 @@ struct Stand {
 }
 
 impl Stand {
-    /// Everything has come to rest long ago.
+    /// Everything has come to rest long ago: three days, so that the ten that a segment may
+    /// last at the lowest rate can be added.
     const AT_REST: Self = Self {
-        time: TickTime::MAX,
+        time: 1 << 60,
         least: 0,
         fastest: Rate::ONE,
     };
 
-    /// How much longer to stand before a segment that is walked at up to `licence`, when
-    /// `left` of the tick is left.
-    fn wait(&self, kernel: &Kernel, next: &RawSegment, licence: Rate, left: TickTime) -> TickTime {
+    /// The way along the next segment, if its dwell ends within what is `left` of the tick.
+    fn begin(
+        &self,
+        kernel: &Kernel,
+        next: &RawSegment,
+        wanted: Rate,
+        left: TickTime,
+    ) -> Option<Way> {
+        let licence = if wanted > Rate::ONE && next.begins_alone {
+            wanted.min(next.top_rate)
+        } else {
+            Rate::ONE
+        };
+        let dwell = self.dwell(kernel, next.overlap, licence, left);
+        let wait = dwell.wrapping_sub(self.time).max(0);
+        if wait >= left {
+            return None;
+        }
+        let mut way = Way {
+            progress: 0,
+            remaining: next.duration,
+            since_corner: self.time.wrapping_add(wait),
+            licence,
+        };
+        way.advance(next, wanted.min(licence).raw(left - wait), left - wait);
+        Some(way)
+    }
+
+    /// How long to stand before a segment that is walked at up to `licence`, when `left` of the
+    /// tick is left.
+    fn dwell(&self, kernel: &Kernel, overlap: TickTime, licence: Rate, left: TickTime) -> TickTime {
         let fastest = self.fastest.max(licence);
         let overlap = if fastest > Rate::ONE {
-            fastest.real(next.overlap) - ONE_TICK
+            fastest.real(overlap) - ONE_TICK
         } else {
-            next.overlap
+            overlap
         };
         let dwell = if overlap > 0 {
             kernel.length() - overlap
@@ -84,7 +113,7 @@ impl Stand {
             let since_arrival = self.time.wrapping_add(left);
             kernel.stop_time(since_arrival & (ONE_TICK - 1))
         };
-        dwell.max(self.least).saturating_sub(self.time).max(0)
+        dwell.max(self.least)
     }
 }
 
@@ -107,6 +136,14 @@ impl Way {
             self.licence = wanted.min(segment.top_rate);
         }
         wanted.min(self.licence)
+    }
+
+    /// Goes on for `share` of raw time, which takes `time`.
+    fn advance(&mut self, segment: &RawSegment, share: TickTime, time: TickTime) {
+        let progress = part_of_tick(segment.rate, share);
+        self.progress = self.progress.wrapping_add(progress);
+        self.remaining -= share;
+        self.since_corner = self.since_corner.wrapping_add(time);
     }
 }
 
@@ -210,40 +247,59 @@ impl<'q> Walker<'q> {
     /// Walks on for one tick. An arc begins only where `arc_may_begin`.
     pub fn step(&mut self, kernel: &Kernel, arc_may_begin: bool) -> RawStep<'_> {
         let mut left = ONE_TICK;
-        let ended = self.finish(kernel, &mut left);
-        let began = self.begin(kernel, &mut left, arc_may_begin);
-        let progress = self.advance(kernel, left);
-        let under_way = match self.walk {
-            Walk::Moving(_) => self.queue.segment(),
-            Walk::Standing(_) => None,
-        };
-        let bow = under_way.and_then(|segment| segment.bow.as_ref());
-        RawStep {
+        let ended = self.go_on(kernel, &mut left);
+        let segment = self.queue.segment();
+        let mut began = false;
+        if let Walk::Standing(stand) = &mut self.walk {
+            let next = segment.filter(|next| !self.held && (arc_may_begin || next.bow.is_none()));
+            let way = next.and_then(|next| stand.begin(kernel, next, self.rates.of(next), left));
+            match way {
+                Some(way) => {
+                    self.walk = Walk::Moving(way);
+                    began = true;
+                }
+                None => stand.time = stand.time.wrapping_add(left),
+            }
+        }
+        let mut step = RawStep {
             chord: self.point,
             ended,
-            began: bow.filter(|_| began),
-            progress,
-            moves: !self.held && under_way.is_some_and(|under_way| under_way.moves()),
+            began: None,
+            progress: 0,
+            moves: false,
+        };
+        if let (Walk::Moving(way), Some(segment)) = (&self.walk, segment) {
+            step.progress = (way.progress.min(WHOLE) >> 32) as i32;
+            step.chord = segment.chord_point(step.progress);
+            step.moves = !self.held && segment.moves();
+            if began {
+                step.began = segment.bow.as_ref();
+            }
+            self.point = step.chord;
         }
+        step
     }
 
-    /// Ends the segment under way if it ends within what is `left` of the tick.
-    fn finish(&mut self, kernel: &Kernel, left: &mut TickTime) -> bool {
-        let (Walk::Moving(way), Some(segment), false) =
-            (&mut self.walk, self.queue.segment(), self.held)
-        else {
+    /// Goes on along the segment under way for a tick, or to its end if that comes before:
+    /// `true`, with what is then `left` of the tick.
+    fn go_on(&mut self, kernel: &Kernel, left: &mut TickTime) -> bool {
+        let (Walk::Moving(way), Some(segment)) = (&mut self.walk, self.queue.segment()) else {
             return false;
         };
-        let rate = way.rate(kernel, segment, self.rates.of(segment));
-        let within = rate.raw(*left);
-        if way.remaining > within {
+        if self.held {
+            way.since_corner = way.since_corner.wrapping_add(ONE_TICK);
             return false;
         }
-        let unused = rate.real(within - way.remaining);
-        let since_corner = way.since_corner.saturating_add(*left - unused);
-        *left = unused;
+        let rate = way.rate(kernel, segment, self.rates.of(segment));
+        let share = rate.raw(ONE_TICK);
+        if way.remaining > share {
+            way.advance(segment, share, ONE_TICK);
+            return false;
+        }
+        *left = rate.real(share - way.remaining);
         self.point = segment.target;
         self.walk = Walk::Standing(if segment.moves() {
+            let since_corner = way.since_corner.wrapping_add(ONE_TICK - *left);
             Stand {
                 time: 0,
                 least: if segment.top_rate > Rate::ONE {
@@ -259,60 +315,13 @@ impl<'q> Walker<'q> {
         self.queue.pop();
         true
     }
-
-    /// Begins the next segment if its dwell ends within what is `left` of the tick, else
-    /// stands on.
-    fn begin(&mut self, kernel: &Kernel, left: &mut TickTime, arc_may_begin: bool) -> bool {
-        let Walk::Standing(stand) = &mut self.walk else {
-            return false;
-        };
-        let next = self.queue.segment().filter(|_| !self.held);
-        let next = next.filter(|next| arc_may_begin || next.bow.is_none());
-        if let Some(next) = next {
-            let top_rate = if next.begins_alone {
-                next.top_rate
-            } else {
-                Rate::ONE
-            };
-            let licence = self.rates.of(next).min(top_rate).max(Rate::ONE);
-            let wait = stand.wait(kernel, next, licence, *left);
-            if wait < *left {
-                *left -= wait;
-                self.walk = Walk::Moving(Way {
-                    progress: 0,
-                    remaining: next.duration,
-                    since_corner: stand.time.saturating_add(wait),
-                    licence,
-                });
-                return true;
-            }
-        }
-        stand.time = stand.time.saturating_add(*left);
-        false
-    }
-
-    /// Moves along the segment under way for what is `left` of the tick.
-    fn advance(&mut self, kernel: &Kernel, left: TickTime) -> i32 {
-        let (Walk::Moving(way), Some(segment)) = (&mut self.walk, self.queue.segment()) else {
-            return 0;
-        };
-        if !self.held {
-            let rate = way.rate(kernel, segment, self.rates.of(segment));
-            let share = rate.raw(left);
-            way.progress = way.progress.wrapping_add(part_of_tick(segment.rate, share));
-            way.remaining -= share;
-        }
-        way.since_corner = way.since_corner.saturating_add(left);
-        let so_far = (way.progress.min(WHOLE) >> 32) as i32;
-        self.point = segment.chord_point(so_far);
-        so_far
-    }
 }
 
-/// `rate` (a whole tick's) for a time of up to two ticks, without overflow.
+/// `rate` (a whole tick's) for a time of a few ticks, rounded down, without overflow.
 fn part_of_tick(rate: u64, time: TickTime) -> u64 {
-    let time = time as u64;
+    let (ticks, rest) = ((time >> 32) as u32, u64::from(time as u32));
     let (high, low) = (rate >> 32, rate & 0xFFFF_FFFF);
-    high.wrapping_mul(time)
-        .wrapping_add((low >> 1).wrapping_mul(time) >> 31)
+    rate.wrapping_mul(u64::from(ticks))
+        .wrapping_add(high * rest)
+        .wrapping_add(low * rest >> 32)
 }

@@ -65,9 +65,14 @@ fn main() -> ! {
             ("ei", Kind::Ei, 6.34),
         ] {
             let robot = robot(kind, frequency_hz);
-            let worst = bench.run(&robot, text, filters);
+            let worst = bench.run(&robot, text, filters, 100);
             bench.print(format_args!("tick/{program}/{filter}"), worst.tick);
             bench.print(format_args!("line/{program}/{filter}"), worst.line);
+        }
+        let robot = robot(Kind::FirZvd, 6.34);
+        for percent in [63, 137] {
+            let worst = bench.run(&robot, text, filters, percent);
+            bench.print(format_args!("tick/{program}/at-{percent}"), worst.tick);
         }
     }
     for kind in Kind::ALL {
@@ -118,13 +123,23 @@ impl Bench {
         instructions
     }
 
-    /// The dearest tick and the dearest line of a program.
-    fn run(&self, robot: &Robot, program: &str, filters: &mut DelayLines) -> Worst {
+    /// The dearest tick and the dearest line of a program at a feed override.
+    fn run(
+        &self,
+        robot: &Robot,
+        program: &str,
+        filters: &mut DelayLines,
+        feed_percent: u16,
+    ) -> Worst {
         let mut worst = Worst::default();
         let mut queue = SegmentQueue::new();
         let (producer, consumer) = queue.split();
         let mut planner = Planner::new(robot, producer);
         let mut motion = Motion::new(robot, consumer, filters);
+        motion.obey(Order::Rates {
+            feed_percent,
+            rapid_percent: 100,
+        });
         let mut lines = program.lines();
         let mut more = true;
         loop {
