@@ -249,7 +249,7 @@ impl<'q> Planner<'q> {
         if let Some(duration_s) = command.dwell_s {
             queued |= self.stand_still(f64::from(duration_s));
         }
-        for (order, duration_s) in command.moves.iter().zip(durations_s) {
+        for (order, duration_s) in command.moves().zip(durations_s) {
             let tolerance_mm = order.corner_tolerance_mm;
             let robot = &self.robot;
             queued |= duration_s > 0.0
@@ -279,7 +279,7 @@ impl<'q> Planner<'q> {
             self.robot.scara.check(pose).map_err(Cause::Pose)?;
         }
         let mut durations_s = [0.0; 2];
-        for (order, duration_s) in command.moves.iter().zip(&mut durations_s) {
+        for (order, duration_s) in command.moves().zip(&mut durations_s) {
             *duration_s = self.checked_duration_s(order)?;
         }
         Ok(durations_s)
