@@ -293,7 +293,7 @@ impl<'q> Planner<'q> {
         if let Some(duration_s) = command.dwell_s {
             queued |= self.stand_still(f64::from(duration_s));
         }
-        for (order, timing) in command.moves.iter().zip(&timings) {
+        for (order, timing) in command.moves().zip(&timings) {
             queued |= timing.duration_s > 0.0
                 && self
                     .schedule
@@ -330,7 +330,7 @@ impl<'q> Planner<'q> {
             self.robot.scara.check(pose).map_err(Cause::Pose)?;
         }
         let mut timings = [Timing::default(); 2];
-        for (order, timing) in command.moves.iter().zip(&mut timings) {
+        for (order, timing) in command.moves().zip(&mut timings) {
             *timing = self.checked_timing(order)?;
         }
         Ok(timings)

@@ -26,7 +26,7 @@ fn arc_move(lines: &[&str]) -> (Move, Arc) {
         command = run(&mut interpreter, line);
     }
     if let Ok(command) = &command
-        && let [motion] = *command.moves
+        && let Some(motion) = command.motion
         && let Shape::Arc(arc) = motion.path.shape
     {
         return (motion, arc);
@@ -251,7 +251,7 @@ proptest! {
             match run(&mut interpreter, text) {
                 Ok(command) => {
                     let mut end = position;
-                    for motion in &command.moves {
+                    for motion in command.moves() {
                         prop_assert_eq!(motion.path.start, end);
                         end = motion.path.target;
                         match motion.path.shape {

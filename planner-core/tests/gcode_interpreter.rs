@@ -1,54 +1,17 @@
 //! G-code from text to commands: what every line does, and what every wrong line is called.
 
+mod support;
+
+use std::collections::BTreeSet;
+
 use planner_core::gcode::{
-    Command, Defaults, Distance, Error, Feed, Interpreter, Line, Motion, Move, ProgramFlow, Units,
+    BLOW_OFF, Command, Coolant, Defaults, Distance, Feed, FeedMode, GRIPPER, Interpreter, Line,
+    Motion, Move, Plane, ProgramFlow, RobotChange, Spindle, Units,
 };
 use planner_core::kinematics::Elbow;
 use planner_core::path::{PathSegment, Shape};
-use planner_core::pose::Pose;
 use planner_core::prefilter::{Kind, PrefilterConfig};
-use planner_core::units::LengthMm;
-
-const DEFAULTS: Defaults = Defaults {
-    corner_tolerance_mm: 0.25,
-    prefilter: PrefilterConfig {
-        kind: Kind::FirZvd,
-        frequency_hz: 6.34,
-        damping: 0.022,
-    },
-    elbow: Elbow::Right,
-    first_point_declares: true,
-};
-
-/// Executes one line and commits it.
-fn run(interpreter: &mut Interpreter, text: &str) -> Result<Command, Error> {
-    let line = Line::parse(text.as_bytes())?;
-    let interpreted = interpreter.interpret(&line)?;
-    interpreter.commit(&interpreted);
-    Ok(interpreted.command)
-}
-
-/// An interpreter after a program of good lines.
-fn after(lines: &[&str]) -> Interpreter {
-    let mut interpreter = Interpreter::new(DEFAULTS);
-    for line in lines {
-        run(&mut interpreter, line).unwrap_or_else(|error| panic!("{line}: {error}"));
-    }
-    interpreter
-}
-
-fn run_move(interpreter: &mut Interpreter, text: &str) -> Move {
-    let command = run(interpreter, text);
-    match command.as_ref().map(|command| &*command.moves) {
-        Ok([motion]) => *motion,
-        _ => panic!("{text}: {command:?}"),
-    }
-}
-
-fn pose(x: f64, y: f64, z: f64, c: f64) -> Pose {
-    let [x, y, z, c] = [x, y, z, c].map(LengthMm::from_num);
-    Pose { x, y, z, c }
-}
+use support::{DEFAULTS, after, pose, run, run_move};
 
 #[test]
 fn every_wrong_line_has_its_code() {
@@ -57,6 +20,7 @@ fn every_wrong_line_has_its_code() {
     const ARC: &[&str] = &["G0 X10 Y0", "F600"];
     const G80: &[&str] = &["G0 X10 Y0", "G80"];
     const INVERSE_TIME: &[&str] = &["G0 X10 Y0", "G93 G1 X1 F60"];
+    let mut codes = BTreeSet::new();
     for (before, text, code) in [
         (RAPID, "10", 1),
         (RAPID, "X", 2),
@@ -237,6 +201,12 @@ fn every_wrong_line_has_its_code() {
         }
         assert_eq!(*interpreter.modal(), modal, "{text}");
         assert_eq!(*interpreter.offsets(), offsets, "{text}");
+        codes.insert(code);
+    }
+    // Grbl's codes of G-code lines; 11 is the receiver's, 15 and 16 are those of jogs.
+    let grbl = [1, 2, 4].into_iter().chain(20..=38);
+    for code in grbl.chain([60, 61, 62, 63, 65, 75, 76]) {
+        assert!(codes.contains(&code), "{code}");
     }
 }
 
@@ -394,7 +364,7 @@ fn dwell_pause_and_end() {
     };
     assert_eq!(run(&mut interpreter, "G4 P.1"), Ok(dwell));
     assert_eq!(run(&mut interpreter, "M0"), Ok(pause));
-    assert_eq!(run(&mut interpreter, "M30"), Ok(end.clone()));
+    assert_eq!(run(&mut interpreter, "M30"), Ok(end));
     let modal = *interpreter.modal();
     assert_eq!(modal.motion(), Motion::Linear);
     assert_eq!(modal.distance(), Distance::Absolute);
@@ -428,4 +398,234 @@ fn incremental_moves_do_not_drift() {
     }
     let position = interpreter.modal().position();
     assert_eq!(position, Some(pose(3000.0, -30.0, 0.0, 0.0)));
+}
+
+/// Grbl's order of execution: outputs, dwell, motion, program flow.
+#[test]
+fn one_line_may_ask_for_several_actions() {
+    let mut interpreter = after(&["G0 X10 Y0 F600"]);
+    let command = run(&mut interpreter, "G4 P2 G1 X20 M3 M8 M0").unwrap();
+    assert_eq!(command.outputs, Some(GRIPPER | BLOW_OFF));
+    assert_eq!(command.dwell_s, Some(2.0));
+    let motion = command.motion.unwrap();
+    assert_eq!(motion.path.target, pose(20.0, 0.0, 0.0, 0.0));
+    assert_eq!(command.outputs_after, None);
+    assert_eq!(command.flow, Some(ProgramFlow::Pause));
+    assert_eq!(command.moves().count(), 1);
+
+    let command = run(&mut interpreter, "M5 X10 M30").unwrap();
+    assert_eq!(command.outputs, Some(BLOW_OFF));
+    assert!(command.motion.is_some());
+    assert_eq!(command.outputs_after, Some(0));
+    assert_eq!(command.flow, Some(ProgramFlow::End));
+
+    let mut interpreter = after(&["G0 X10 Y0", "G10 L2 P1 X1"]);
+    let command = run(&mut interpreter, "M3 G28 X5 M2").unwrap();
+    assert_eq!(command.outputs, Some(GRIPPER));
+    assert_eq!(command.moves().count(), 2);
+    assert_eq!(command.outputs_after, Some(0));
+}
+
+#[test]
+fn outputs_are_told_when_they_change() {
+    let mut interpreter = after(&[]);
+    for (text, outputs) in [
+        ("M5", None),
+        ("M9", None),
+        ("M3", Some(GRIPPER)),
+        ("M3 S500", None),
+        ("M4", None),
+        ("M7", Some(GRIPPER | BLOW_OFF)),
+        ("M8", None),
+        ("M5", Some(BLOW_OFF)),
+        ("M4 M9", Some(GRIPPER)),
+        ("M5 M9", Some(0)),
+    ] {
+        let command = Command {
+            outputs,
+            ..Command::default()
+        };
+        assert_eq!(run(&mut interpreter, text), Ok(command), "{text}");
+    }
+    let interpreter = after(&["M4 M7", "M8"]);
+    let modal = interpreter.modal();
+    let coolant = Coolant {
+        mist: true,
+        flood: true,
+    };
+    assert_eq!(modal.spindle(), Spindle::CounterClockwise);
+    assert_eq!(modal.coolant(), coolant);
+    assert_eq!(modal.outputs(), GRIPPER | BLOW_OFF);
+}
+
+#[test]
+fn inverse_time_is_that_of_its_line() {
+    let mut interpreter = after(&["G0 X10 Y0 F600"]);
+    assert_eq!(
+        run_move(&mut interpreter, "G93 G1 X11 F2").feed,
+        Feed::Seconds(30.0)
+    );
+    assert_eq!(
+        run_move(&mut interpreter, "G20 X12 F0.5").feed,
+        Feed::Seconds(120.0)
+    );
+    assert_eq!(
+        run_move(&mut interpreter, "G21 C90 F60").feed,
+        Feed::Seconds(1.0)
+    );
+    assert_eq!(
+        run_move(&mut interpreter, "G2 X300 R5 F6").feed,
+        Feed::Seconds(10.0)
+    );
+    // Rapids need none, and nothing of G93 is left over for G94.
+    assert_eq!(run_move(&mut interpreter, "G0 X13").feed, Feed::Rapid);
+    assert_eq!(interpreter.modal().feed_mode(), FeedMode::InverseTime);
+    assert_eq!(interpreter.modal().feed_mm_per_min(), None);
+    assert_eq!(
+        run_move(&mut interpreter, "G94 G1 X14 F60").feed,
+        Feed::MmPerS(1.0)
+    );
+    run(&mut interpreter, "G93 G1 X15 F60").unwrap();
+    run(&mut interpreter, "M30").unwrap();
+    assert_eq!(interpreter.modal().feed_mode(), FeedMode::PerMinute);
+    assert_eq!(interpreter.modal().feed_mm_per_min(), None);
+}
+
+/// The words and their order are Grbl's, those of the robot come last.
+#[test]
+fn the_parser_state_reads_as_grbls() {
+    for (lines, text) in [
+        (&[][..], "G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0 G64 P0.25"),
+        (
+            &[
+                "G0 X10 Y0",
+                "G91 G3 X5 R5 F2 G55 M3 M7 T12 S1000.6",
+                "G18 G20 G93 G61 M8 F2",
+            ],
+            "G3 G55 G18 G20 G91 G93 M3 M7 M8 T12 F2 S1001 G61",
+        ),
+        (
+            &["G80 G59 G19 M4 M8 F1234.5 G64 P1"],
+            "G80 G59 G19 G21 G90 G94 M4 M8 T0 F1235 S0 G64 P1",
+        ),
+        (
+            &["G1 G20 F10 M7", "M30"],
+            "G1 G54 G17 G20 G90 G94 M5 M9 T0 F254 S0 G64 P0.25",
+        ),
+    ] {
+        assert_eq!(after(lines).parser_state().to_string(), text);
+    }
+    let interpreter = after(&["G0 X10 Y0", "G2 X5 R5 F2", "G56 G19 M7"]);
+    let text = "G2 G56 G19 G21 G90 G94 M5 M7 T0 F2 S0 G64 P0.25";
+    assert_eq!(interpreter.parser_state().to_string(), text);
+}
+
+#[test]
+fn an_end_takes_back_what_grbls_does() {
+    let mut interpreter = after(&[
+        "G10 L2 P2 X5 Y5",
+        "G0 X10 Y0 F600 T3 S9",
+        "G55 G18 G91 G20 G61 M3 M8",
+        "G92 Z3",
+        "M30",
+    ]);
+    let modal = interpreter.modal();
+    assert_eq!(modal.work_system(), 0);
+    assert_eq!(modal.plane(), Plane::Xy);
+    assert_eq!(modal.outputs(), 0);
+    let state = interpreter.parser_state().to_string();
+    assert_eq!(state, "G1 G54 G17 G20 G90 G94 M5 M9 T3 F600 S9 G64 P0.25");
+    // G92 stays until a reset.
+    assert_eq!(interpreter.work_offset(), pose(0.0, 0.0, -76.2, 0.0));
+    run(&mut interpreter, "G21").unwrap();
+}
+
+#[test]
+fn a_reset_keeps_position_and_stored_offsets() {
+    let mut interpreter = after(&[
+        "G0 X10 Y20",
+        "G10 L2 P1 X5",
+        "G28.1",
+        "G43.1 Z3",
+        "G92 Y1",
+        "G1 G20 G91 G55 G61 F100 M3 T1 S1",
+        "M101",
+    ]);
+    let stored = interpreter.offsets().to_bytes();
+    interpreter.reset();
+    let mut fresh = Interpreter::new(DEFAULTS);
+    fresh.set_position(Some(pose(10.0, 20.0, 0.0, 0.0)));
+    assert_eq!(interpreter.modal(), fresh.modal());
+    assert_eq!(interpreter.offsets().to_bytes(), stored);
+    assert_eq!(interpreter.offsets().g92(), pose(0.0, 0.0, 0.0, 0.0));
+    assert_eq!(interpreter.offsets().tool_length(), 0);
+    assert_eq!(interpreter.work_offset(), pose(5.0, 0.0, 0.0, 0.0));
+}
+
+#[test]
+fn the_robots_words_change_what_they_name() {
+    let mut interpreter = after(&[]);
+    let config = |kind, frequency_hz, damping| PrefilterConfig {
+        kind,
+        frequency_hz,
+        damping,
+    };
+    for (text, change) in [
+        (
+            "M100 P0",
+            Some(RobotChange::Prefilter(config(Kind::None, 6.34, 0.022))),
+        ),
+        (
+            "N5 M100 P1 Q12.5 R0.1",
+            Some(RobotChange::Prefilter(config(Kind::Zv, 12.5, 0.1))),
+        ),
+        (
+            "M100 Q8",
+            Some(RobotChange::Prefilter(config(Kind::Zv, 8.0, 0.1))),
+        ),
+        ("M100 P1", None),
+        ("M100", None),
+        ("M102", None),
+        ("M101", Some(RobotChange::Elbow(Elbow::Left))),
+        ("M101", None),
+        ("M102", Some(RobotChange::Elbow(Elbow::Right))),
+    ] {
+        let command = Command {
+            robot: change,
+            ..Command::default()
+        };
+        assert_eq!(run(&mut interpreter, text), Ok(command), "{text}");
+    }
+    for (place, kind) in Kind::ALL.into_iter().enumerate() {
+        run(&mut interpreter, &format!("M100 P{place}")).unwrap();
+        assert_eq!(interpreter.modal().prefilter().kind, kind);
+    }
+    run(&mut interpreter, "M101").unwrap();
+    assert_eq!(interpreter.modal().elbow(), Elbow::Left);
+    // New settings hold, whatever a program has said before.
+    interpreter.set_defaults(Defaults {
+        corner_tolerance_mm: 1.0,
+        ..DEFAULTS
+    });
+    assert_eq!(interpreter.modal().elbow(), Elbow::Right);
+    assert_eq!(*interpreter.modal().prefilter(), DEFAULTS.prefilter);
+    assert_eq!(interpreter.modal().corner_tolerance_mm(), 1.0);
+}
+
+#[test]
+fn the_first_point_declares_only_if_the_settings_say_so() {
+    let mut interpreter = Interpreter::new(Defaults {
+        first_point_declares: false,
+        ..DEFAULTS
+    });
+    for text in ["G0 X1 Y2", "G53 X1 Y2", "G28"] {
+        let error = run(&mut interpreter, text).unwrap_err();
+        assert_eq!(error.code(), 62, "{text}");
+    }
+    interpreter.set_position(Some(pose(0.0, 0.0, 0.0, 0.0)));
+    run_move(&mut interpreter, "G0 X1 Y2");
+    // It counts from work zero, as any point does.
+    let mut interpreter = after(&["G10 L2 P1 X10 Y20", "G43.1 Z5"]);
+    let command = run(&mut interpreter, "G0 X1 Y2 Z3").unwrap();
+    assert_eq!(command.reference, Some(pose(11.0, 22.0, 8.0, 0.0)));
 }

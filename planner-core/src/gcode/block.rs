@@ -1,8 +1,6 @@
 //! The words of a line, sorted into commands and values.
 
-use super::code::{
-    Code, CoolantChange, Group, Groups, NonModal, PathControl, RobotCode, ToolLength,
-};
+use super::code::{Code, CoolantChange, Groups, NonModal, PathControl, RobotCode, ToolLength};
 use super::command::ProgramFlow;
 use super::error::Error;
 use super::line::{Line, Word};
@@ -149,11 +147,6 @@ impl<'l> Block<'l> {
             | Code::OptionalStop
             | Code::ToolChange => {}
         }
-    }
-
-    /// Whether the line has a command of the motion group, G80 included.
-    pub(super) const fn has_motion_code(&self) -> bool {
-        self.groups.has(Group::Motion)
     }
 }
 

@@ -1,7 +1,5 @@
 //! What a line asks the planner to do.
 
-use heapless::Vec;
-
 use crate::kinematics::Elbow;
 use crate::path::PathSegment;
 use crate::pose::Pose;
@@ -18,7 +16,7 @@ pub const BLOW_OFF: u8 = 1 << 1;
 pub const MAX_ACTIONS_A_LINE: usize = 5;
 
 /// The actions of one line, in the order in which they are executed: Grbl's.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Command {
     /// A change of the robot, which stands in a line of its own.
     pub robot: Option<RobotChange>,
@@ -28,12 +26,21 @@ pub struct Command {
     pub dwell_s: Option<f32>,
     /// Where the robot is: the first point of a program that began without a position.
     pub reference: Option<Pose>,
-    /// Motions: G28 and G30 may have an intermediate point.
-    pub moves: Vec<Move, 2>,
+    /// A motion to the intermediate point of G28 and G30.
+    pub via: Option<Move>,
+    /// A motion.
+    pub motion: Option<Move>,
     /// New state of all outputs after the motion, if it changes (M2, M30).
     pub outputs_after: Option<u8>,
     /// What becomes of the program.
     pub flow: Option<ProgramFlow>,
+}
+
+impl Command {
+    /// The motions, in their order.
+    pub fn moves(&self) -> impl Iterator<Item = &Move> {
+        self.via.iter().chain(&self.motion)
+    }
 }
 
 /// What M0, M2 and M30 do to the program.

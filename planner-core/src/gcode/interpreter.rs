@@ -1,22 +1,21 @@
 //! Lines into commands, by the modal state.
 
-use crate::kinematics::Elbow;
 use crate::pose::Pose;
-use crate::prefilter::{Kind, PrefilterConfig};
 
 use super::block::Block;
-use super::code::{Group, NonModal, PathControl, RobotCode, ToolLength};
-use super::command::{Command, Move, ProgramFlow, RobotChange};
+use super::code::{Group, NonModal, PathControl};
+use super::command::{Command, ProgramFlow};
 use super::error::Error;
 use super::line::Line;
 use super::modal::{
     Coolant, Defaults, Distance, FeedMode, Feedrate, Modal, Motion, Plane, Spindle,
 };
-use super::motion::{Frame, Travel, linear_to, rapid_to, take_axis_words, travel};
-use super::number::Decimal;
-use super::offsets::{OffsetChange, Offsets, WORK_SYSTEMS};
+use super::motion::{Frame, Travel, go, linear_to, take_axis_words, travel};
+use super::offset_words::offset_change;
+use super::offsets::{OffsetChange, Offsets};
 use super::parser_state::ParserState;
-use super::position::{AxisWords, ORIGIN, Position, Z, checked, nearest_pose};
+use super::position::{AxisWords, Position, nearest_pose};
+use super::robot_words::robot_command;
 
 /// Largest line number, Grbl's.
 pub(super) const MAX_LINE_NUMBER: u32 = 10_000_000;
@@ -162,13 +161,13 @@ impl Interpreter {
         let mut block = Block::collect(line, &mut modal)?;
         let line_number = take_line_number(&mut block)?.unwrap_or(block.modal.lines);
         if let Some(code) = block.robot {
-            let command = self.robot_line(block, code)?;
+            let command = robot_command(block, code)?;
             return Ok(self.done(modal, command, None));
         }
         self.take_plain_values(&mut block)?;
         let dwell_s = take_dwell_s(&mut block)?;
         let words = take_axis_words(&mut block)?;
-        let change = self.offset_change(&mut block, &words)?;
+        let change = offset_change(&mut block, &self.offsets, &words)?;
         let mut command = Command {
             dwell_s,
             ..Command::default()
@@ -231,7 +230,7 @@ impl Interpreter {
             line_number,
         );
         let command = Command {
-            moves: motion.into_iter().collect(),
+            motion,
             ..Command::default()
         };
         let modal = Modal {
@@ -291,100 +290,6 @@ impl Interpreter {
         Ok(())
     }
 
-    /// What G10, G28.1, G30.1, G43.1, G49, G92 and G92.1 change.
-    fn offset_change(
-        &self,
-        block: &mut Block,
-        words: &AxisWords,
-    ) -> Result<Option<OffsetChange>, Error> {
-        let has_words = words.iter().any(Option::is_some);
-        match block.tool_length {
-            Some(ToolLength::Set) => {
-                let [None, None, Some(z), None] = *words else {
-                    return Err(Error::ToolLengthAxis);
-                };
-                let length = checked(Z, z.to_nano())?;
-                return Ok(Some(OffsetChange::ToolLength(length)));
-            }
-            Some(ToolLength::Cancel) if has_words => return Err(Error::AxisConflict),
-            Some(ToolLength::Cancel) => {
-                return Ok(Some(OffsetChange::ToolLength(Decimal::ZERO)));
-            }
-            None => {}
-        }
-        match block.non_modal {
-            Some(NonModal::SetWorkSystem | NonModal::SetOffset) if !has_words => {
-                Err(Error::NoAxisWords)
-            }
-            Some(NonModal::SetWorkSystem) => self.set_work_system(block, words).map(Some),
-            Some(NonModal::SetOffset) => {
-                let position = block.modal.position.ok_or(Error::PositionUnknown)?;
-                let origin = *self.offsets.row(block.modal.work_system());
-                let mut g92 = *self.offsets.g92_exact();
-                for (axis, value) in g92.iter_mut().enumerate() {
-                    let Some(word) = words.get(axis).copied().flatten() else {
-                        continue;
-                    };
-                    let origin_nano = origin.get(axis).map_or(0, |value| value.to_nano());
-                    let tool_nano = self.offsets.tool_length_nano(axis);
-                    let nano = position.nano(axis) - origin_nano - tool_nano;
-                    *value = checked(axis, nano.saturating_sub(word.to_nano()))?;
-                }
-                Ok(Some(OffsetChange::G92(g92)))
-            }
-            Some(NonModal::ResetOffset) => Ok(Some(OffsetChange::G92(ORIGIN))),
-            Some(NonModal::Store(row)) => {
-                let position = block.modal.position.ok_or(Error::PositionUnknown)?;
-                Ok(Some(OffsetChange::Stored(row, *position.exact())))
-            }
-            Some(NonModal::Dwell | NonModal::Go(_) | NonModal::MachineCoordinates) | None => {
-                Ok(None)
-            }
-        }
-    }
-
-    /// G10: L2 sets the origin of a coordinate system, L20 makes the position have the
-    /// given coordinates in it.
-    fn set_work_system(&self, block: &mut Block, words: &AxisWords) -> Result<OffsetChange, Error> {
-        let (system, kind) = (block.take(b'P'), block.take(b'L'));
-        if system.is_none() && kind.is_none() {
-            return Err(Error::NoOffsetKind);
-        }
-        // As in Grbl, a P that is missing is the active system; decimals are cut off.
-        let row = match usize::try_from(system.unwrap_or_default().integer()) {
-            Ok(0) => block.modal.work_system(),
-            Ok(system) if system <= WORK_SYSTEMS => system - 1,
-            _ => return Err(Error::WorkOffset),
-        };
-        let kind = kind.unwrap_or_default();
-        let position = match kind.integer() {
-            2 if block.value(b'R').is_some() => {
-                return Err(Error::UnsupportedWord { letter: b'R' });
-            }
-            2 => None,
-            20 => Some(block.modal.position.ok_or(Error::PositionUnknown)?),
-            _ => {
-                return Err(Error::UnsupportedCommand {
-                    letter: b'L',
-                    number: kind,
-                });
-            }
-        };
-        let mut origin = *self.offsets.row(row);
-        for (axis, value) in origin.iter_mut().enumerate() {
-            let Some(word) = words.get(axis).copied().flatten() else {
-                continue;
-            };
-            let nano = match position {
-                None => word.to_nano(),
-                Some(position) => (position.nano(axis) - self.offsets.overlay_nano(axis))
-                    .saturating_sub(word.to_nano()),
-            };
-            *value = checked(axis, nano)?;
-        }
-        Ok(OffsetChange::Stored(row, origin))
-    }
-
     /// The motions of a line: of G28 and G30, or of the motion mode.
     fn motions(
         &self,
@@ -406,99 +311,25 @@ impl Interpreter {
         if block.modal.motion == Motion::Cancelled && has_words {
             return Err(Error::AxisWordsWithoutMotion);
         }
+        let moves_by_mode = has_words || block.groups.has(Group::Motion);
         match block.non_modal {
             Some(NonModal::Go(row)) => {
-                for motion in self
-                    .go(block, frame, words, line, row)?
-                    .into_iter()
-                    .flatten()
-                {
-                    // There is room for both.
-                    let _ = command.moves.push(motion);
-                }
+                let end = self.offsets.row(row);
+                [command.via, command.motion] = go(block, frame, words, end, line)?;
             }
             Some(NonModal::SetWorkSystem | NonModal::SetOffset) => {}
-            _ if block.tool_length.is_some() => {}
-            _ if has_words || block.has_motion_code() => {
-                if block.modal.motion == Motion::Cancelled {
-                    return Ok(());
-                }
+            _ if block.tool_length.is_some() || block.modal.motion == Motion::Cancelled => {}
+            _ if moves_by_mode => {
                 let declares = self.defaults.first_point_declares;
                 match travel(block, frame, words, line, declares)? {
                     Travel::Nothing => {}
                     Travel::Reference(pose) => command.reference = Some(pose),
-                    Travel::Move(motion) => {
-                        // There is room for it.
-                        let _ = command.moves.push(motion);
-                    }
+                    Travel::Move(motion) => command.motion = Some(motion),
                 }
             }
             _ => {}
         }
         Ok(())
-    }
-
-    /// G28 and G30: by way of the axis words, if there are any, to the stored position;
-    /// with axis words, these axes only.
-    fn go(
-        &self,
-        block: &mut Block,
-        frame: Frame,
-        words: &AxisWords,
-        line: u32,
-        row: usize,
-    ) -> Result<[Option<Move>; 2], Error> {
-        let modal = &mut *block.modal;
-        let start = modal.position.ok_or(Error::PositionUnknown)?;
-        let all = words.iter().all(Option::is_none);
-        let by_way_of = frame.target(modal, start, words)?;
-        let mut end = start;
-        for (axis, (word, value)) in words.iter().zip(self.offsets.row(row)).enumerate() {
-            if all || word.is_some() {
-                end.set(axis, *value);
-            }
-        }
-        Ok([rapid_to(modal, by_way_of, line), rapid_to(modal, end, line)])
-    }
-
-    /// M100 to M102.
-    fn robot_line(&self, mut block: Block, code: RobotCode) -> Result<Command, Error> {
-        if !block.groups.is_within(&[Group::Robot]) {
-            return Err(Error::OwnLine);
-        }
-        let change = match code {
-            RobotCode::Elbow(elbow) => self.elbow_change(&mut block, elbow),
-            RobotCode::Prefilter => self.prefilter_change(&mut block)?,
-        };
-        if let Some(letter) = block.unused() {
-            return Err(Error::UnusedWord { letter });
-        }
-        Ok(Command {
-            robot: change,
-            ..Command::default()
-        })
-    }
-
-    fn elbow_change(&self, block: &mut Block, elbow: Elbow) -> Option<RobotChange> {
-        block.modal.elbow = elbow;
-        (elbow != self.modal.elbow).then_some(RobotChange::Elbow(elbow))
-    }
-
-    fn prefilter_change(&self, block: &mut Block) -> Result<Option<RobotChange>, Error> {
-        let before = self.modal.prefilter;
-        let kind = match block.take(b'P') {
-            None => before.kind,
-            Some(number) => prefilter_kind(number)?,
-        };
-        let frequency_hz = block.take(b'Q').map(Decimal::to_f32);
-        let damping = block.take(b'R').map(Decimal::to_f32);
-        let prefilter = PrefilterConfig {
-            kind,
-            frequency_hz: frequency_hz.unwrap_or(before.frequency_hz),
-            damping: damping.unwrap_or(before.damping),
-        };
-        block.modal.prefilter = prefilter;
-        Ok((prefilter != before).then_some(RobotChange::Prefilter(prefilter)))
     }
 
     /// Back to G1, G17, G54, G90, G94, M5, M9 and the robot's corner tolerance, and to line
@@ -538,19 +369,4 @@ fn take_dwell_s(block: &mut Block) -> Result<Option<f32>, Error> {
     }
     let time = block.take(b'P').ok_or(Error::NoDwellTime)?;
     Ok(Some(time.to_f32()))
-}
-
-/// The prefilter of M100's P.
-fn prefilter_kind(number: Decimal) -> Result<Kind, Error> {
-    match number.tenths() {
-        Some(tenths) if tenths % 10 == 0 => Kind::ALL
-            .get(usize::from(tenths / 10))
-            .copied()
-            .ok_or(Error::NoSuchPrefilter),
-        Some(_) => Err(Error::NotAnInteger {
-            letter: b'P',
-            number,
-        }),
-        None => Err(Error::NoSuchPrefilter),
-    }
 }

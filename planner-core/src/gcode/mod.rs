@@ -25,10 +25,12 @@ mod line;
 mod modal;
 mod motion;
 mod number;
+mod offset_words;
 mod offsets;
 mod parser_state;
 mod position;
 mod receiver;
+mod robot_words;
 
 pub use command::{
     BLOW_OFF, Command, Feed, GRIPPER, MAX_ACTIONS_A_LINE, Move, ProgramFlow, RobotChange,

@@ -10,7 +10,7 @@ use super::error::Error;
 use super::modal::{Distance, Feedrate, Modal, Motion, Plane, Units};
 use super::number::Decimal;
 use super::offsets::Offsets;
-use super::position::{AxisWords, LETTERS, Position, checked};
+use super::position::{AxisWords, Coordinates, LETTERS, Position, checked};
 
 /// The axis words of a line, lengths in mm.
 pub(super) fn take_axis_words(block: &mut Block) -> Result<AxisWords, Error> {
@@ -125,16 +125,38 @@ pub(super) fn travel(
     Ok(moving(block.modal, path, feed, line).map_or(Travel::Nothing, Travel::Move))
 }
 
-/// A straight motion as fast as may be, with the position as its target: of G28 and G30.
-pub(super) fn rapid_to(modal: &mut Modal, end: Position, line: u32) -> Option<Move> {
-    let start = modal.position?.to_pose();
+/// G28 and G30: by way of the axis words, if there are any, to a position; with axis words,
+/// these axes only. The modal state's position becomes the end.
+///
+/// # Errors
+/// Codes 61 and 62.
+pub(super) fn go(
+    block: &mut Block,
+    frame: Frame,
+    words: &AxisWords,
+    position: &Coordinates,
+    line: u32,
+) -> Result<[Option<Move>; 2], Error> {
+    let modal = &mut *block.modal;
+    let start = modal.position.ok_or(Error::PositionUnknown)?;
+    let by_way_of = frame.target(modal, start, words)?;
+    let all = words.iter().all(Option::is_none);
+    let mut end = start;
+    for (axis, (word, value)) in words.iter().zip(position).enumerate() {
+        if all || word.is_some() {
+            end.set(axis, *value);
+        }
+    }
     modal.position = Some(end);
-    let path = PathSegment {
-        start,
-        target: end.to_pose(),
-        shape: Shape::Line,
+    let rapid = |start: Position, target: Position| {
+        let path = PathSegment {
+            start: start.to_pose(),
+            target: target.to_pose(),
+            shape: Shape::Line,
+        };
+        moving(modal, path, Feed::Rapid, line)
     };
-    moving(modal, path, Feed::Rapid, line)
+    Ok([rapid(start, by_way_of), rapid(by_way_of, end)])
 }
 
 /// A straight motion at a feedrate: of a jog. Does not change the modal state.

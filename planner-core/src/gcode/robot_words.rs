@@ -1,0 +1,65 @@
+//! The robot's own words, M100 to M102.
+
+use crate::kinematics::Elbow;
+use crate::prefilter::{Kind, PrefilterConfig};
+
+use super::block::Block;
+use super::code::{Group, RobotCode};
+use super::command::{Command, RobotChange};
+use super::error::Error;
+use super::number::Decimal;
+
+/// What a line with one of them does: nothing else may stand in it.
+///
+/// # Errors
+/// Codes 23, 36, 65 and 76.
+pub(super) fn robot_command(mut block: Block, code: RobotCode) -> Result<Command, Error> {
+    if !block.groups.is_within(&[Group::Robot]) {
+        return Err(Error::OwnLine);
+    }
+    let robot = match code {
+        RobotCode::Elbow(elbow) => elbow_change(&mut block, elbow),
+        RobotCode::Prefilter => prefilter_change(&mut block)?,
+    };
+    if let Some(letter) = block.unused() {
+        return Err(Error::UnusedWord { letter });
+    }
+    Ok(Command {
+        robot,
+        ..Command::default()
+    })
+}
+
+fn elbow_change(block: &mut Block, elbow: Elbow) -> Option<RobotChange> {
+    let before = core::mem::replace(&mut block.modal.elbow, elbow);
+    (elbow != before).then_some(RobotChange::Elbow(elbow))
+}
+
+/// M100: words that are not given keep their values.
+fn prefilter_change(block: &mut Block) -> Result<Option<RobotChange>, Error> {
+    let before = block.modal.prefilter;
+    let kind = block.take(b'P').map(prefilter_kind).transpose()?;
+    let frequency_hz = block.take(b'Q').map(Decimal::to_f32);
+    let damping = block.take(b'R').map(Decimal::to_f32);
+    let prefilter = PrefilterConfig {
+        kind: kind.unwrap_or(before.kind),
+        frequency_hz: frequency_hz.unwrap_or(before.frequency_hz),
+        damping: damping.unwrap_or(before.damping),
+    };
+    block.modal.prefilter = prefilter;
+    Ok((prefilter != before).then_some(RobotChange::Prefilter(prefilter)))
+}
+
+/// The prefilter of M100's P, its place among [`Kind::ALL`].
+fn prefilter_kind(number: Decimal) -> Result<Kind, Error> {
+    let kind = usize::try_from(number.integer())
+        .ok()
+        .and_then(|place| Kind::ALL.get(place).copied())
+        .ok_or(Error::NoSuchPrefilter)?;
+    if Decimal::from_integer(number.integer() as i32) == number {
+        Ok(kind)
+    } else {
+        let letter = b'P';
+        Err(Error::NotAnInteger { letter, number })
+    }
+}
