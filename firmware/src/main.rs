@@ -4,8 +4,8 @@
 
 use embassy_executor::Executor;
 use firmware::board::{
-    self, Board, BoardOutputs, BoardWatchdog, CommandIn, CommandOut, Counter, SetpointOut, StackUse,
-    Stopwatch, stack_use,
+    self, Board, BoardFlash, BoardOutputs, BoardWatchdog, CommandIn, CommandOut, Counter,
+    SetpointOut, StackUse, Stopwatch, stack_use,
 };
 use firmware::tasks::command::Commands;
 use firmware::tasks::control::Frames;
@@ -16,6 +16,7 @@ use planner_core::motion::{DelayLines, Motion};
 use planner_core::planner::Planner;
 use planner_core::protocol::{Controller, Identity, Settings};
 use planner_core::queue::SegmentQueue;
+use planner_core::store::Store;
 use static_cell::{ConstStaticCell, StaticCell};
 
 #[cortex_m_rt::entry]
@@ -31,7 +32,7 @@ fn main() -> ! {
 /// Starts the board, the control task and the setpoint task; returns what the command task
 /// needs. Not inlined, because the frame of `main` stays on the stack for ever.
 #[inline(never)]
-fn start() -> Commands<CommandIn, CommandOut> {
+fn start() -> Commands<CommandIn, CommandOut, BoardFlash> {
     static LINK: StaticCell<Link> = StaticCell::new();
     static FRAMES: StaticCell<Frames> = StaticCell::new();
     static SEGMENTS: ConstStaticCell<SegmentQueue> = ConstStaticCell::new(SegmentQueue::new());
@@ -44,6 +45,7 @@ fn start() -> Commands<CommandIn, CommandOut> {
         command_out,
         setpoint_out,
         outputs,
+        flash,
         watchdog,
         stopwatch,
         control,
@@ -80,6 +82,7 @@ fn start() -> Commands<CommandIn, CommandOut> {
         controller,
         robot,
         link,
+        store: defmt::expect!(Store::new(flash, board::STORE), "the store is whole pages"),
     }
 }
 
@@ -101,7 +104,7 @@ async fn setpoint_task(frames: &'static Frames, port: SetpointOut) {
 }
 
 #[embassy_executor::task]
-async fn command_task(commands: Commands<CommandIn, CommandOut>) {
+async fn command_task(commands: Commands<CommandIn, CommandOut, BoardFlash>) {
     command::run(commands).await
 }
 

@@ -3,10 +3,10 @@
 
 use std::collections::HashMap;
 
+use fixed::traits::ToFixed;
 use planner_core::config::Robot;
 use planner_core::motion::{DelayLines, Motion, Order, Setpoint};
 use planner_core::planner::Planner;
-use fixed::traits::ToFixed;
 use planner_core::pose::{JointPosition, Pose};
 use planner_core::protocol::{
     Controller, Health, Identity, Inputs, RECORD_BYTES, Record, Report, Settings, Step,
@@ -120,7 +120,8 @@ impl SerialLoop<'_> {
     pub fn state(&mut self) -> String {
         let heard = std::mem::take(&mut self.output);
         self.send(b"?");
-        let report = String::from_utf8_lossy(&std::mem::replace(&mut self.output, heard)).into_owned();
+        let report =
+            String::from_utf8_lossy(&std::mem::replace(&mut self.output, heard)).into_owned();
         let start = report.rfind('<').map_or(0, |start| start + 1);
         let end = report[start..].find('|').unwrap_or(0);
         report[start..start + end].to_string()

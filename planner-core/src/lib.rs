@@ -20,6 +20,7 @@ pub mod queue;
 pub mod rate;
 pub mod raw;
 mod schedule;
+pub mod store;
 pub mod telemetry;
 pub mod units;
 mod walker;

@@ -379,7 +379,11 @@ impl<'q> Planner<'q> {
         };
         let is_move = way > 0.0;
         Timing {
-            duration_s: if is_move { wanted_s.max(shortest_s) } else { 0.0 },
+            duration_s: if is_move {
+                wanted_s.max(shortest_s)
+            } else {
+                0.0
+            },
             shortest_s,
             pace,
         }

@@ -323,5 +323,5 @@ fn part_of_tick(rate: u64, time: TickTime) -> u64 {
     let (high, low) = (rate >> 32, rate & 0xFFFF_FFFF);
     rate.wrapping_mul(u64::from(ticks))
         .wrapping_add(high * rest)
-        .wrapping_add(low * rest >> 32)
+        .wrapping_add((low * rest) >> 32)
 }

@@ -28,7 +28,7 @@ compile_error!("choose one board: `nucleo-g474re` is the default, so add --no-de
 compile_error!("choose a board: feature `nucleo-g474re` or `mps2-an386`");
 
 /// What a board gives the tasks.
-pub struct Board<I, O, S, D, W, T> {
+pub struct Board<I, O, S, D, F, W, T> {
     /// Commands come in here.
     pub command_in: I,
     /// Answers go out here.
@@ -37,6 +37,8 @@ pub struct Board<I, O, S, D, W, T> {
     pub setpoint_out: S,
     /// Drives the gripper and the blow-off.
     pub outputs: D,
+    /// Keeps the settings over power-off, in the board's range `STORE`.
+    pub flash: F,
     /// Resets the board when the control task does not keep up.
     pub watchdog: W,
     /// Measures the tick.

@@ -11,6 +11,7 @@
 use core::cell::RefCell;
 use core::fmt::Write;
 use core::future::poll_fn;
+use core::ops::Range;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use core::task::{Poll, Waker};
 
@@ -23,6 +24,7 @@ use embassy_executor::InterruptExecutor;
 use embassy_sync::waitqueue::AtomicWaker;
 use embassy_time::Timer;
 use embassy_time_queue_utils::Queue;
+use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use heapless::Deque;
 
 use super::{Board, ByteIn, ByteOut, Outputs, Stopwatch, WATCHDOG_MS, Watchdog};
@@ -39,7 +41,8 @@ const TIME_PER_SYSTICK: u64 = embassy_time::TICK_HZ / SYSTICK_HZ as u64;
 pub const NAME: &str = "mps2-an386";
 
 /// The emulated board's parts.
-pub type Parts = Board<CommandIn, CommandOut, SetpointOut, BoardOutputs, BoardWatchdog, Counter>;
+pub type Parts =
+    Board<CommandIn, CommandOut, SetpointOut, BoardOutputs, BoardFlash, BoardWatchdog, Counter>;
 
 /// A memory-mapped register.
 #[derive(Clone, Copy)]
@@ -165,6 +168,7 @@ pub fn start() -> Parts {
         command_out: UartOut(Uart::COMMANDS),
         setpoint_out: UartOut(Uart::SETPOINTS),
         outputs: BoardOutputs(()),
+        flash: BoardFlash::start(),
         watchdog: BoardWatchdog::start(),
         stopwatch: Counter::start(),
         control: CONTROL.start(Interrupt::Control),
@@ -299,6 +303,87 @@ impl BoardOutputs {
 impl Outputs for BoardOutputs {
     fn set(&mut self, bits: u8) {
         Self::LEDS.write(bits.into());
+    }
+}
+
+/// Where the store is, in the simulated flash.
+pub const STORE: Range<u32> = 0..BoardFlash::BYTES as u32;
+
+/// A flash memory with 8-byte words and 2 KiB pages, as in the real board, simulated in the
+/// machine's PSRAM: it outlasts a reset, and not the emulator.
+pub struct BoardFlash(());
+
+impl BoardFlash {
+    const BASE: usize = 0x2100_0000;
+    const BYTES: usize = 4 * 2048;
+    /// Behind the flash: tells one that was ever erased from memory that was just switched on.
+    const MARK: Register = Register(Self::BASE + Self::BYTES);
+    const MARKED: u32 = 0x5350_4653;
+    const ERASED: u32 = u32::MAX;
+
+    fn start() -> Self {
+        if Self::MARK.read() != Self::MARKED {
+            for at in (0..Self::BYTES).step_by(4) {
+                Register(Self::BASE + at).write(Self::ERASED);
+            }
+            Self::MARK.write(Self::MARKED);
+        }
+        Self(())
+    }
+
+    /// The registers of a range, or an error if it is not within the flash.
+    fn registers(from: u32, length: usize) -> Result<Range<usize>, NorFlashErrorKind> {
+        let from = from as usize;
+        match from.checked_add(length) {
+            Some(end) if end <= Self::BYTES => Ok(Self::BASE + from..Self::BASE + end),
+            _ => Err(NorFlashErrorKind::OutOfBounds),
+        }
+    }
+}
+
+impl ErrorType for BoardFlash {
+    type Error = NorFlashErrorKind;
+}
+
+impl ReadNorFlash for BoardFlash {
+    const READ_SIZE: usize = 4;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        let registers = Self::registers(offset, bytes.len())?;
+        for (at, word) in registers.step_by(4).zip(bytes.chunks_mut(4)) {
+            let value = Register(at).read().to_le_bytes();
+            for (byte, value) in word.iter_mut().zip(value) {
+                *byte = value;
+            }
+        }
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        Self::BYTES
+    }
+}
+
+impl NorFlash for BoardFlash {
+    const WRITE_SIZE: usize = 8;
+    const ERASE_SIZE: usize = 2048;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        for at in Self::registers(from, to.saturating_sub(from) as usize)?.step_by(4) {
+            Register(at).write(Self::ERASED);
+        }
+        Ok(())
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        let registers = Self::registers(offset, bytes.len())?;
+        let (words, _) = bytes.as_chunks::<4>();
+        for (at, word) in registers.step_by(4).zip(words) {
+            let place = Register(at);
+            // writing can only clear bits
+            place.write(place.read() & u32::from_le_bytes(*word));
+        }
+        Ok(())
     }
 }
 

@@ -8,9 +8,12 @@
 //! | clock | HSE 24 MHz, PLL ÷ 6 × 85 ÷ 2 |
 #![allow(unsafe_code, reason = "interrupt handlers call their executors")]
 
+use core::ops::Range;
+
 use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
 use embassy_executor::InterruptExecutor;
+use embassy_stm32::flash::{self, Blocking, Flash};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::mode::Async;
@@ -20,6 +23,7 @@ use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, BufferedUartTx, U
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, rcc};
 use embedded_io_async::{Read, Write};
+use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use panic_probe as _;
 use static_cell::ConstStaticCell;
 
@@ -29,7 +33,8 @@ use super::{Board, ByteIn, ByteOut, Outputs, Stopwatch, WATCHDOG_MS, Watchdog};
 pub const NAME: &str = "nucleo-g474re";
 
 /// The real board's parts.
-pub type Parts = Board<CommandIn, CommandOut, SetpointOut, BoardOutputs, BoardWatchdog, Counter>;
+pub type Parts =
+    Board<CommandIn, CommandOut, SetpointOut, BoardOutputs, BoardFlash, BoardWatchdog, Counter>;
 
 const COMMAND_BAUD: u32 = 115_200;
 
@@ -109,6 +114,7 @@ pub fn start() -> Parts {
             gripper: Output::new(p.PA5, Level::Low, Speed::Low),
             blow_off: Output::new(p.PA6, Level::Low, Speed::Low),
         },
+        flash: BoardFlash(Flash::new_blocking(p.FLASH)),
         watchdog: BoardWatchdog(watchdog),
         stopwatch: Counter::start(),
         control: CONTROL.start(interrupt::SAI1),
@@ -188,6 +194,44 @@ impl Outputs for BoardOutputs {
     fn set(&mut self, bits: u8) {
         self.gripper.set_level((bits & 1 != 0).into());
         self.blow_off.set_level((bits & 2 != 0).into());
+    }
+}
+
+/// Where the store is: the last pages of the flash. They are in its second bank, so that code
+/// runs on from the first while they are erased; `memory.x` keeps the program out of them.
+pub const STORE: Range<u32> = FLASH_BYTES - 4 * 2048..FLASH_BYTES;
+
+const FLASH_BYTES: u32 = 512 * 1024;
+
+/// The microcontroller's own flash.
+pub struct BoardFlash(Flash<'static, Blocking>);
+
+impl ErrorType for BoardFlash {
+    type Error = flash::Error;
+}
+
+impl ReadNorFlash for BoardFlash {
+    const READ_SIZE: usize = flash::READ_SIZE;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), flash::Error> {
+        self.0.blocking_read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        FLASH_BYTES as usize
+    }
+}
+
+impl NorFlash for BoardFlash {
+    const WRITE_SIZE: usize = flash::WRITE_SIZE;
+    const ERASE_SIZE: usize = 2048;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), flash::Error> {
+        self.0.blocking_erase(from, to)
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), flash::Error> {
+        self.0.blocking_write(offset, bytes)
     }
 }
 

@@ -1,8 +1,12 @@
 //! The command task: carries out what the core's controller decides.
 
+use core::fmt::Debug;
+
 use embassy_time::{Duration, Instant, with_deadline};
+use embedded_storage_async::nor_flash::NorFlash;
 use planner_core::config::Robot;
-use planner_core::protocol::{Controller, Step};
+use planner_core::protocol::{Controller, RECORD_BYTES, Record, Step};
+use planner_core::store::{BUFFER_BYTES, Buffer, Damaged, Store};
 
 use crate::board::{ByteIn, ByteOut};
 use crate::tasks::link::Link;
@@ -11,7 +15,7 @@ use crate::tasks::link::Link;
 const READ_BYTES: usize = 64;
 
 /// Everything between the command port and the control task.
-pub struct Commands<I, O> {
+pub struct Commands<I, O, F: NorFlash> {
     /// Where commands come from.
     pub input: I,
     /// Where answers go.
@@ -22,17 +26,22 @@ pub struct Commands<I, O> {
     pub robot: &'static mut Robot,
     /// To the control task.
     pub link: &'static Link,
+    /// What outlasts power-off.
+    pub store: Store<F>,
 }
 
 /// Serves the command port for ever.
-pub async fn run(commands: Commands<impl ByteIn, impl ByteOut>) -> ! {
+pub async fn run<F: NorFlash<Error: Debug>>(commands: Commands<impl ByteIn, impl ByteOut, F>) -> ! {
     let Commands {
         mut input,
         mut output,
         controller,
         mut robot,
         link,
+        mut store,
     } = commands;
+    let mut memory = [0; BUFFER_BYTES];
+    restore(controller, &mut store, &mut memory).await;
     let mut bytes = [0; READ_BYTES];
     loop {
         let now = Instant::now();
@@ -46,6 +55,16 @@ pub async fn run(commands: Commands<impl ByteIn, impl ByteOut>) -> ! {
                 robot.clone_from(controller.robot());
                 robot = link.exchange_robot(robot).await;
             }
+            Step::Keep(record) => {
+                let mut value = [0; RECORD_BYTES];
+                let value = controller.record(record, &mut value);
+                let saved = store.save(record, value, &mut memory).await;
+                controller.kept(saved.is_ok());
+            }
+            Step::ForgetRecords => {
+                let erased = store.erase().await;
+                controller.kept(erased.is_ok());
+            }
             Step::Wait(until_ms) => {
                 wake = until_ms.map_or(Instant::MAX, |ms| Instant::MIN + Duration::from_millis(ms));
             }
@@ -55,6 +74,25 @@ pub async fn run(commands: Commands<impl ByteIn, impl ByteOut>) -> ! {
             let now_ms = Instant::now().as_millis();
             for &byte in bytes.iter().take(count) {
                 controller.receive(byte, now_ms);
+            }
+        }
+    }
+}
+
+/// Gives the controller what has outlasted power-off. What cannot be read is erased.
+async fn restore<F: NorFlash<Error: Debug>>(
+    controller: &mut Controller<'_>,
+    store: &mut Store<F>,
+    memory: &mut Buffer,
+) {
+    for record in Record::ALL {
+        match store.load(record, memory).await {
+            Ok(Some(value)) => controller.restore(record, value),
+            Ok(None) => {}
+            Err(Damaged) => {
+                // If that fails too, the first setting to be kept will say so.
+                let _ = store.erase().await;
+                return controller.store_was_damaged();
             }
         }
     }

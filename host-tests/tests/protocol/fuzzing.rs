@@ -17,7 +17,9 @@ const INPUTS_PER_RESET: u64 = 500;
 
 /// One line of the corpus, or two, with some bytes changed, lost, doubled or foreign.
 fn mutated(rng: &mut ChaCha8Rng, corpus: &[&str]) -> Vec<u8> {
-    let mut line = corpus[rng.random_range(0..corpus.len())].as_bytes().to_vec();
+    let mut line = corpus[rng.random_range(0..corpus.len())]
+        .as_bytes()
+        .to_vec();
     if rng.random_bool(0.1) {
         let other = corpus[rng.random_range(0..corpus.len())].as_bytes();
         let cut = rng.random_range(0..=line.len());
@@ -32,7 +34,10 @@ fn mutated(rng: &mut ChaCha8Rng, corpus: &[&str]) -> Vec<u8> {
                 line.remove(at);
             }
             2 if at < line.len() => line.insert(at, line[at]),
-            3 => line.insert(at, b"0123456789.-+*$=;() XYZCFGMNPQRIJKLST"[rng.random_range(0..37)]),
+            3 => line.insert(
+                at,
+                b"0123456789.-+*$=;() XYZCFGMNPQRIJKLST"[rng.random_range(0..37)],
+            ),
             4 => line.insert(at, rng.random()),
             _ => {
                 let times = rng.random_range(1..400);
@@ -84,14 +89,18 @@ fn fuzz(inputs: u64, seed: u64) {
                 let input = mutated(&mut rng, &corpus);
                 for byte in &input {
                     let received = lines.push(*byte);
-                    expected += usize::from(matches!(received, Received::Line | Received::Overflow));
+                    expected +=
+                        usize::from(matches!(received, Received::Line | Received::Overflow));
                 }
                 desk.send(&input);
                 if done % 8 == 0 {
                     desk.run_ms(2);
                 }
                 answered += answers(&desk.heard());
-                assert!(answered <= expected, "seed {seed}, input {done}: more answers than lines");
+                assert!(
+                    answered <= expected,
+                    "seed {seed}, input {done}: more answers than lines"
+                );
             }
             // What is held, paused, locked or asleep may leave lines unanswered, and no more
             // than fit into the inbox; everything else is answered in the end.

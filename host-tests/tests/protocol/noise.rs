@@ -113,7 +113,10 @@ impl PathWatch {
         if !self.targets.is_empty() {
             self.worst_mm = self.worst_mm.max(least);
         }
-        assert!(least <= ALLOWED_MM || self.targets.is_empty(), "the tool is {least} mm off every accepted move");
+        assert!(
+            least <= ALLOWED_MM || self.targets.is_empty(),
+            "the tool is {least} mm off every accepted move"
+        );
     }
 }
 
@@ -324,7 +327,10 @@ fn no_damage_moves_the_robot_off_its_accepted_path() {
 #[test]
 fn with_checksums_every_line_is_executed_once_and_in_order() {
     let outcome = protected(20_000, 3);
-    assert!(outcome.executed >= 20_000 - 10 * outcome.resets, "{outcome:?}");
+    assert!(
+        outcome.executed >= 20_000 - 10 * outcome.resets,
+        "{outcome:?}"
+    );
     assert!(outcome.resent > 100, "{outcome:?}");
 }
 
@@ -334,6 +340,9 @@ fn a_million_damaged_lines() {
     let answered = unprotected(500_000, 5);
     assert!(answered > 475_000, "{answered} answers");
     let outcome = protected(500_000, 7);
-    assert!(outcome.executed >= 500_000 - 10 * outcome.resets, "{outcome:?}");
+    assert!(
+        outcome.executed >= 500_000 - 10 * outcome.resets,
+        "{outcome:?}"
+    );
     println!("{answered} of 500000 unprotected lines answered; protected: {outcome:?}");
 }

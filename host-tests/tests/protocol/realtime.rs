@@ -85,7 +85,10 @@ fn a_reset_at_rest_forgets_the_lines_before_it_and_none_behind_it() {
         desk.run_ms(20);
         let heard = desk.heard();
         assert_eq!(heard.matches("ok").count(), 1, "{heard}");
-        assert!(desk.ask("$G").contains("G21 G90"), "modes are those of the start");
+        assert!(
+            desk.ask("$G").contains("G21 G90"),
+            "modes are those of the start"
+        );
     });
 }
 
@@ -132,7 +135,9 @@ fn overrides_change_the_speed_under_way() {
             let report = desk.heard();
             let start = report.find("FS:").unwrap() + 3;
             let end = report[start..].find(',').unwrap();
-            report[start..start + end].parse::<u32>().unwrap_or_else(|_| panic!("{report}"))
+            report[start..start + end]
+                .parse::<u32>()
+                .unwrap_or_else(|_| panic!("{report}"))
         };
         desk.ask("G1 X300 F1200");
         desk.run_ms(1500);
@@ -181,7 +186,14 @@ fn outputs_switch_where_the_tool_has_come_to_rest() {
         }
         let expected = [(0, 200.0), (1, 220.0), (0, 240.0), (2, 240.0)];
         let first = seen.iter().position(|(outputs, _)| *outputs != 0).unwrap();
-        assert_eq!(seen[first - 1..].iter().skip(1).copied().collect::<Vec<_>>(), expected[1..]);
+        assert_eq!(
+            seen[first - 1..]
+                .iter()
+                .skip(1)
+                .copied()
+                .collect::<Vec<_>>(),
+            expected[1..]
+        );
         assert_eq!(x_mm(desk), 220.0);
     });
 }
@@ -247,7 +259,10 @@ fn check_mode_checks_and_moves_nothing() {
         let answer = desk.ask("$C");
         desk.run_ms(20);
         let heard = answer + &desk.heard();
-        assert!(heard.contains("[MSG:Disabled]") && heard.contains("Grbl 1.1h"), "{heard}");
+        assert!(
+            heard.contains("[MSG:Disabled]") && heard.contains("Grbl 1.1h"),
+            "{heard}"
+        );
         assert!(desk.ask("G1 X210 F6000").contains("ok"));
         assert!(desk.run_until("Idle"));
         assert_eq!(x_mm(desk), 210.0);
@@ -279,7 +294,9 @@ fn a_door_holds_until_it_is_closed_and_somebody_says_so() {
 #[test]
 fn any_storm_of_realtime_bytes_ends_in_a_known_state() {
     with_robot(|desk| {
-        let bytes = [b'!', b'~', b'?', 0x84, 0x85, 0x87, 0x90, 0x91, 0x97, 0x19, 0x18];
+        let bytes = [
+            b'!', b'~', b'?', 0x84, 0x85, 0x87, 0x90, 0x91, 0x97, 0x19, 0x18,
+        ];
         desk.ask("G1 X300 F6000");
         desk.run_ms(300);
         for i in 0..20_000_usize {

@@ -25,7 +25,10 @@ fn everything_comes_back_after_a_restart() {
         "G28.1",
     ];
     let (records, heard) = session(Records::new(), &lines);
-    assert!(heard[1..].iter().all(|answer| answer.contains("ok")), "{heard:?}");
+    assert!(
+        heard[1..].iter().all(|answer| answer.contains("ok")),
+        "{heard:?}"
+    );
     let (_, heard) = session(records, &["$11", "$1040", "$N", "$I", "$#", "$G"]);
     assert!(heard[0].contains(">G20:ok"), "{heard:?}");
     for (answer, part) in heard[1..].iter().zip([
@@ -43,8 +46,16 @@ fn everything_comes_back_after_a_restart() {
 
 #[test]
 fn damaged_records_are_passed_over() {
-    for bytes in [vec![], vec![0xFF; 500], vec![7; 3], (0..=255).collect::<Vec<u8>>()] {
-        let records: Records = Record::ALL.into_iter().map(|record| (record, bytes.clone())).collect();
+    for bytes in [
+        vec![],
+        vec![0xFF; 500],
+        vec![7; 3],
+        (0..=255).collect::<Vec<u8>>(),
+    ] {
+        let records: Records = Record::ALL
+            .into_iter()
+            .map(|record| (record, bytes.clone()))
+            .collect();
         let (_, heard) = session(records, &["$$", "G0 X200 Y0", "$#"]);
         assert!(heard[1].contains("$11=0.5"), "{heard:?}");
         assert!(heard[3].ends_with("ok\r\n"), "{heard:?}");

@@ -326,7 +326,10 @@ impl<'q> Controller<'q> {
     }
 
     fn startup_answer(&self, line: u8, code: u8) -> Text {
-        let text = self.startup_lines.get(usize::from(line)).map_or("", |text| text);
+        let text = self
+            .startup_lines
+            .get(usize::from(line))
+            .map_or("", |text| text);
         if code == 0 {
             Text::line(format_args!(">{text}:ok"))
         } else {
@@ -357,8 +360,13 @@ impl<'q> Controller<'q> {
             || self.settings.protocol.hard_limits
             || report.inputs.door != (self.hold == Hold::Door);
         let poll = waits_for_motion.then_some(now_ms + POLL_MS);
-        let start = self.cycle_start.next_check().filter(|_| self.hold == Hold::None);
-        let silence = self.link_timeout_ms().map(|timeout| self.last_byte_ms + timeout);
+        let start = self
+            .cycle_start
+            .next_check()
+            .filter(|_| self.hold == Hold::None);
+        let silence = self
+            .link_timeout_ms()
+            .map(|timeout| self.last_byte_ms + timeout);
         let silence = silence.filter(|_| report.setpoint.state == MotionState::Running);
         [poll, start, silence].into_iter().flatten().min()
     }
@@ -511,7 +519,10 @@ impl Controller<'_> {
         self.startup = None;
         for _ in 0..self.outs.len() {
             if let Some(out) = self.outs.pop_front()
-                && matches!(out, Out::Order(_) | Out::Robot | Out::Keep(_) | Out::ForgetRecords)
+                && matches!(
+                    out,
+                    Out::Order(_) | Out::Robot | Out::Keep(_) | Out::ForgetRecords
+                )
             {
                 self.out(out);
             }
@@ -549,10 +560,14 @@ impl Controller<'_> {
             self.suspend(Hold::Door, report);
             return true;
         }
-        let silent = self.link_timeout_ms().is_some_and(|timeout| now_ms >= self.last_byte_ms + timeout);
+        let silent = self
+            .link_timeout_ms()
+            .is_some_and(|timeout| now_ms >= self.last_byte_ms + timeout);
         if silent && moves && self.hold == Hold::None && self.mode == Mode::Ready {
             self.suspend(Hold::Feed, report);
-            self.out(Out::Message("Nothing was heard for the link timeout: held; go on with ~"));
+            self.out(Out::Message(
+                "Nothing was heard for the link timeout: held; go on with ~",
+            ));
             return true;
         }
         self.run_startup(report)
@@ -1083,7 +1098,11 @@ impl Controller<'_> {
         match record {
             Record::Settings => {
                 let settings = Settings::from_bytes(bytes);
-                self.adopt(&settings);
+                if Robot::new(&settings.robot).is_ok() {
+                    self.adopt(&settings);
+                } else {
+                    self.store_was_damaged();
+                }
             }
             Record::Offsets => {
                 if let Some(offsets) = Offsets::from_bytes(bytes) {
@@ -1124,7 +1143,9 @@ impl Controller<'_> {
 
     /// Says that what was kept is damaged and the defaults are in force.
     pub fn store_was_damaged(&mut self) {
-        self.out(Out::Message("The stored settings were damaged: the defaults are in force"));
+        self.out(Out::Message(
+            "The stored settings were damaged: the defaults are in force",
+        ));
     }
 }
 

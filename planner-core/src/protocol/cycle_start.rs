@@ -64,7 +64,8 @@ impl CycleStart {
     /// Whether to start now; says so once.
     pub fn is_due(&mut self, now_ms: u64, queue_is_full: bool) -> bool {
         let complete = core::mem::take(&mut self.complete);
-        let due = self.waiting && (queue_is_full || complete || now_ms >= self.last_byte_ms + QUIET_MS);
+        let due =
+            self.waiting && (queue_is_full || complete || now_ms >= self.last_byte_ms + QUIET_MS);
         if due {
             self.waiting = false;
         }

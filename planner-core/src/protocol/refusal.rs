@@ -58,15 +58,30 @@ pub const ERRORS: [(u8, &str); 50] = [
     (2, "A letter has no proper number"),
     (3, "There is no such $ command or setting: see $ and $$"),
     (4, "A value is negative that must not be"),
-    (5, "Homing is off: set $22=1 or declare encoders with $1000=1"),
-    (7, "The settings could not be stored: they hold until the next start only"),
+    (
+        5,
+        "Homing is off: set $22=1 or declare encoders with $1000=1",
+    ),
+    (
+        7,
+        "The settings could not be stored: they hold until the next start only",
+    ),
     (8, "Possible only at rest: wait for Idle"),
     (9, "Locked by an alarm or a jog: unlock with $X or wait"),
-    (10, "Alarms on targets out of reach need a known position: enable homing or encoders first"),
+    (
+        10,
+        "Alarms on targets out of reach need a known position: enable homing or encoders first",
+    ),
     (11, "The line is too long: split it"),
-    (14, "The start-up line is too long: 80 characters are the most"),
+    (
+        14,
+        "The start-up line is too long: 80 characters are the most",
+    ),
     (15, "The jog leaves the robot's travel: nothing moves"),
-    (16, "A jog has axis words and F, and G20, G21, G53, G90 or G91 at most"),
+    (
+        16,
+        "A jog has axis words and F, and G20, G21, G53, G90 or G91 at most",
+    ),
     (20, "A command or word that is not supported"),
     (21, "Two commands of one modal group"),
     (22, "A feed move without a feedrate: give F"),
@@ -76,7 +91,10 @@ pub const ERRORS: [(u8, &str); 50] = [
     (26, "A command needs axis words and has none"),
     (27, "The line number is too large"),
     (28, "A command lacks a value that it needs"),
-    (29, "There is no such work coordinate system: use G54 to G59"),
+    (
+        29,
+        "There is no such work coordinate system: use G54 to G59",
+    ),
     (30, "G53 works with G0 and G1 only"),
     (31, "Axis words that no command uses"),
     (32, "The arc has no axis word in its plane"),
@@ -92,18 +110,42 @@ pub const ERRORS: [(u8, &str); 50] = [
     (63, "The checksum is not the line's: send it again"),
     (64, "The line has too many words: split it"),
     (65, "The line asks for two things: split it"),
-    (66, "Not executed after the error before: acknowledge with $ACK"),
-    (67, "Not the next line number: send again from the line after the last ok"),
+    (
+        66,
+        "Not executed after the error before: acknowledge with $ACK",
+    ),
+    (
+        67,
+        "Not the next line number: send again from the line after the last ok",
+    ),
     (70, "The path leaves the robot's reach"),
     (71, "The path comes too close to a singularity"),
     (72, "The path exceeds a joint limit"),
-    (73, "The segment would take more than a day: give a higher feedrate"),
-    (74, "The look-ahead is full: wait for ok before the next line"),
+    (
+        73,
+        "The segment would take more than a day: give a higher feedrate",
+    ),
+    (
+        74,
+        "The look-ahead is full: wait for ok before the next line",
+    ),
     (75, "An arc must lie in the plane G17"),
-    (76, "The prefilter cannot be used: check its frequency and damping"),
-    (77, "The value of the setting cannot be used: see $ES for its range"),
-    (78, "The settings do not make a robot: see the message before"),
-    (79, "The elbow cannot change here: the other side does not reach this point"),
+    (
+        76,
+        "The prefilter cannot be used: check its frequency and damping",
+    ),
+    (
+        77,
+        "The value of the setting cannot be used: see $ES for its range",
+    ),
+    (
+        78,
+        "The settings do not make a robot: see the message before",
+    ),
+    (
+        79,
+        "The elbow cannot change here: the other side does not reach this point",
+    ),
 ];
 
 /// The sentence for an `error:N`.

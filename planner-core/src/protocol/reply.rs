@@ -75,7 +75,10 @@ impl Reply {
         let line = self.next;
         self.next += 1;
         match self.topic {
-            Topic::Help => only(line, "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H $ES $EG $EA $EE $RST= $ACK ~ ! ? ctrl-x]"),
+            Topic::Help => only(
+                line,
+                "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H $ES $EG $EA $EE $RST= $ACK ~ ! ? ctrl-x]",
+            ),
             Topic::Settings => SETTINGS.get(line).map(|setting| known.setting(setting)),
             Topic::Setting(setting) => (line == 0).then(|| known.setting(setting)),
             Topic::Offsets => known.offset(line),
@@ -109,7 +112,10 @@ fn describe(description: Description, line: usize) -> Option<Text> {
         }
         Description::Alarms => {
             let alarm = Alarm::ALL.get(line)?;
-            Some(Text::line(format_args!("[ALARMCODE:{}||{alarm}]", alarm.code())))
+            Some(Text::line(format_args!(
+                "[ALARMCODE:{}||{alarm}]",
+                alarm.code()
+            )))
         }
         Description::Errors => {
             let (code, sentence) = ERRORS.get(line)?;
@@ -146,7 +152,10 @@ impl Known<'_> {
                 let z = offsets.tool_length();
                 Some(Text::line(format_args!("[TLO:{z:.3}]")))
             }
-            1 => Some(Text::line(format_args!("[PRB:{}:0]", shown(Pose::default())))),
+            1 => Some(Text::line(format_args!(
+                "[PRB:{}:0]",
+                shown(Pose::default())
+            ))),
             _ => None,
         }
     }
@@ -172,7 +181,10 @@ impl Known<'_> {
             (1, _) => parts(format_args!("[OPT:VNMH,{blocks},{RX_BYTES},4,0]")),
             (2, true) => parts(format_args!("[AXS:4:XYZC]")),
             (3, true) => parts(format_args!("[NEWOPT:ENUMS,RT+,HOME,ES]")),
-            (4, true) => parts(format_args!("[FIRMWARE:Stillpoint {}]", env!("CARGO_PKG_VERSION"))),
+            (4, true) => parts(format_args!(
+                "[FIRMWARE:Stillpoint {}]",
+                env!("CARGO_PKG_VERSION")
+            )),
             (5, true) => parts(format_args!("[BOARD:{board}]")),
             (2, false) | (6, true) => parts(format_args!(
                 "[TICK:count={ticks},worst={worst_tick} {cost_unit},overruns={overruns},unsent={unsent},starved={starved}]"

@@ -144,33 +144,201 @@ pub const SETTINGS: [Setting; 28] = [
         "",
         Kind::Bits(&["Machine position", "Buffers"]),
     ),
-    setting(11, "tolerance", MOTION, "Corner tolerance", "mm", decimal(0.0, 100.0)),
-    setting(13, "report-inches", REPORTS, "Report in inches", "", Kind::Switch),
-    setting(20, "soft-limit-alarm", SAFETY, "Alarm on a target out of reach", "", Kind::Switch),
-    setting(21, "hard-limits", SAFETY, "Alarm on a limit input in motion", "", Kind::Switch),
+    setting(
+        11,
+        "tolerance",
+        MOTION,
+        "Corner tolerance",
+        "mm",
+        decimal(0.0, 100.0),
+    ),
+    setting(
+        13,
+        "report-inches",
+        REPORTS,
+        "Report in inches",
+        "",
+        Kind::Switch,
+    ),
+    setting(
+        20,
+        "soft-limit-alarm",
+        SAFETY,
+        "Alarm on a target out of reach",
+        "",
+        Kind::Switch,
+    ),
+    setting(
+        21,
+        "hard-limits",
+        SAFETY,
+        "Alarm on a limit input in motion",
+        "",
+        Kind::Switch,
+    ),
     setting(22, "homing", SAFETY, "Locked until homed", "", Kind::Switch),
-    setting(1000, "encoders", SAFETY, "Drives have absolute encoders", "", Kind::Switch),
-    setting(1001, "error-safe", LINK, "Refuse lines after an error until $ACK", "", Kind::Switch),
-    setting(1002, "link-timeout", LINK, "Hold after silence, 0 never", "s", decimal(0.0, 3600.0)),
-    setting(1003, "report-joints", REPORTS, "Report joint positions", "", Kind::Switch),
-    setting(1010, "link1", ROBOT, "Upper arm", "mm", decimal(10.0, 1990.0)),
+    setting(
+        1000,
+        "encoders",
+        SAFETY,
+        "Drives have absolute encoders",
+        "",
+        Kind::Switch,
+    ),
+    setting(
+        1001,
+        "error-safe",
+        LINK,
+        "Refuse lines after an error until $ACK",
+        "",
+        Kind::Switch,
+    ),
+    setting(
+        1002,
+        "link-timeout",
+        LINK,
+        "Hold after silence, 0 never",
+        "s",
+        decimal(0.0, 3600.0),
+    ),
+    setting(
+        1003,
+        "report-joints",
+        REPORTS,
+        "Report joint positions",
+        "",
+        Kind::Switch,
+    ),
+    setting(
+        1010,
+        "link1",
+        ROBOT,
+        "Upper arm",
+        "mm",
+        decimal(10.0, 1990.0),
+    ),
     setting(1011, "link2", ROBOT, "Forearm", "mm", decimal(10.0, 1990.0)),
     setting(1012, "elbow", ROBOT, "Elbow side", "", Kind::Choice(ELBOWS)),
-    setting(1013, "singularity-margin", ROBOT, "Joint 2 from its ends", "deg", decimal(0.5, 45.0)),
-    setting(1021, "joint1-min", ROBOT, "Joint 1 lower limit", "deg", decimal(-360.0, 360.0)),
-    setting(1022, "joint1-max", ROBOT, "Joint 1 upper limit", "deg", decimal(-360.0, 360.0)),
-    setting(1023, "joint2-min", ROBOT, "Joint 2 lower limit", "deg", decimal(-360.0, 360.0)),
-    setting(1024, "joint2-max", ROBOT, "Joint 2 upper limit", "deg", decimal(-360.0, 360.0)),
-    setting(1025, "joint3-min", ROBOT, "Joint 3 lower limit", "mm", decimal(-4000.0, 4000.0)),
-    setting(1026, "joint3-max", ROBOT, "Joint 3 upper limit", "mm", decimal(-4000.0, 4000.0)),
-    setting(1027, "joint4-min", ROBOT, "Joint 4 lower limit", "deg", decimal(-1080.0, 1080.0)),
-    setting(1028, "joint4-max", ROBOT, "Joint 4 upper limit", "deg", decimal(-1080.0, 1080.0)),
-    setting(1040, "prefilter", MOTION, "Prefilter", "", Kind::Choice(PREFILTERS)),
-    setting(1041, "frequency", MOTION, "Natural frequency to suppress", "Hz", decimal(0.01, 250.0)),
-    setting(1042, "damping", MOTION, "Damping ratio", "", decimal(0.0, 0.5)),
-    setting(1050, "rapid", MOTION, "Feedrate of G0", "mm/s", decimal(0.001, 10_000.0)),
-    setting(1051, "feed-limit", MOTION, "Fastest feedrate", "mm/s", decimal(0.001, 10_000.0)),
-    setting(1052, "yaw-limit", MOTION, "Fastest yaw", "deg/s", decimal(0.001, 10_000.0)),
+    setting(
+        1013,
+        "singularity-margin",
+        ROBOT,
+        "Joint 2 from its ends",
+        "deg",
+        decimal(0.5, 45.0),
+    ),
+    setting(
+        1021,
+        "joint1-min",
+        ROBOT,
+        "Joint 1 lower limit",
+        "deg",
+        decimal(-360.0, 360.0),
+    ),
+    setting(
+        1022,
+        "joint1-max",
+        ROBOT,
+        "Joint 1 upper limit",
+        "deg",
+        decimal(-360.0, 360.0),
+    ),
+    setting(
+        1023,
+        "joint2-min",
+        ROBOT,
+        "Joint 2 lower limit",
+        "deg",
+        decimal(-360.0, 360.0),
+    ),
+    setting(
+        1024,
+        "joint2-max",
+        ROBOT,
+        "Joint 2 upper limit",
+        "deg",
+        decimal(-360.0, 360.0),
+    ),
+    setting(
+        1025,
+        "joint3-min",
+        ROBOT,
+        "Joint 3 lower limit",
+        "mm",
+        decimal(-4000.0, 4000.0),
+    ),
+    setting(
+        1026,
+        "joint3-max",
+        ROBOT,
+        "Joint 3 upper limit",
+        "mm",
+        decimal(-4000.0, 4000.0),
+    ),
+    setting(
+        1027,
+        "joint4-min",
+        ROBOT,
+        "Joint 4 lower limit",
+        "deg",
+        decimal(-1080.0, 1080.0),
+    ),
+    setting(
+        1028,
+        "joint4-max",
+        ROBOT,
+        "Joint 4 upper limit",
+        "deg",
+        decimal(-1080.0, 1080.0),
+    ),
+    setting(
+        1040,
+        "prefilter",
+        MOTION,
+        "Prefilter",
+        "",
+        Kind::Choice(PREFILTERS),
+    ),
+    setting(
+        1041,
+        "frequency",
+        MOTION,
+        "Natural frequency to suppress",
+        "Hz",
+        decimal(0.01, 250.0),
+    ),
+    setting(
+        1042,
+        "damping",
+        MOTION,
+        "Damping ratio",
+        "",
+        decimal(0.0, 0.5),
+    ),
+    setting(
+        1050,
+        "rapid",
+        MOTION,
+        "Feedrate of G0",
+        "mm/s",
+        decimal(0.001, 10_000.0),
+    ),
+    setting(
+        1051,
+        "feed-limit",
+        MOTION,
+        "Fastest feedrate",
+        "mm/s",
+        decimal(0.001, 10_000.0),
+    ),
+    setting(
+        1052,
+        "yaw-limit",
+        MOTION,
+        "Fastest yaw",
+        "deg/s",
+        decimal(0.001, 10_000.0),
+    ),
 ];
 
 /// Number and value of a setting, as kept.
@@ -194,7 +362,9 @@ impl Setting {
     /// The value that a text gives, if it is one of this setting's.
     fn read(&self, text: &str) -> Option<f32> {
         if let Kind::Choice(names) = self.kind
-            && let Some(choice) = names.iter().position(|name| name.eq_ignore_ascii_case(text))
+            && let Some(choice) = names
+                .iter()
+                .position(|name| name.eq_ignore_ascii_case(text))
         {
             return Some(choice as f32);
         }
@@ -441,7 +611,12 @@ mod tests {
             for (value, is_robot) in [(low, true), (high, true), (high * 1.01, false)] {
                 let mut config = RobotConfig::default();
                 config.set_value(setting.name, value);
-                assert_eq!(Robot::new(&config).is_ok(), is_robot, "{} {value}", setting.name);
+                assert_eq!(
+                    Robot::new(&config).is_ok(),
+                    is_robot,
+                    "{} {value}",
+                    setting.name
+                );
             }
         }
     }
@@ -449,7 +624,10 @@ mod tests {
     #[test]
     fn a_setting_describes_itself() {
         let text = |name| format!("{}", Setting::find(name).unwrap());
-        assert_eq!(text("elbow"), "[SETTING:1012|3|Elbow side||3|left,right|||0|0]");
+        assert_eq!(
+            text("elbow"),
+            "[SETTING:1012|3|Elbow side||3|left,right|||0|0]"
+        );
         assert_eq!(text("22"), "[SETTING:22|1|Locked until homed||0||||0|0]");
         assert_eq!(
             text("tolerance"),
