@@ -97,6 +97,52 @@ impl<'q> Controller<'q> {
         self.motion.set_robot(robot);
     }
 
+    /// The planner, for what no line says.
+    pub fn planner(&mut self) -> &mut Planner<'q> {
+        &mut self.planner
+    }
+
+    /// Gives lines to the planner while it has room for what they may queue; `false` when the
+    /// program has ended.
+    ///
+    /// # Errors
+    /// The first line that is refused. What was queued before it may have moved: [`check`]
+    /// the program first.
+    pub fn feed<'p>(
+        &mut self,
+        lines: &mut impl Iterator<Item = &'p str>,
+    ) -> Result<bool, LineError> {
+        while self.planner.has_room() {
+            let Some(line) = lines.next() else {
+                return Ok(false);
+            };
+            let accepted = self.planner.line(line.as_bytes())?;
+            if let Some(pose) = accepted.reference {
+                self.motion.obey(Order::Place(pose));
+            }
+            if accepted.ended {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Passes an order to the motion.
+    pub fn obey(&mut self, order: Order) {
+        self.motion.obey(order);
+    }
+
+    /// The setpoint of the next tick.
+    pub fn tick(&mut self) -> Setpoint {
+        self.motion.tick()
+    }
+
+    /// Whether nothing is queued or under way.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.motion.is_empty()
+    }
+
     /// Runs a program to its end and hands each tick's setpoint to `each`.
     ///
     /// The queue is kept full, as a sender does that heeds `ok`; motion starts when the queue
@@ -104,29 +150,42 @@ impl<'q> Controller<'q> {
     /// motion starts, the last one its end at rest.
     ///
     /// # Errors
-    /// The first line that is refused. What was queued before it may have moved: [`check`]
-    /// the program first.
-    pub fn run(&mut self, program: &str, mut each: impl FnMut(&Setpoint)) -> Result<(), LineError> {
+    /// See [`Controller::feed`].
+    pub fn run(&mut self, program: &str, each: impl FnMut(&Setpoint)) -> Result<(), LineError> {
+        self.run_with_orders(program, |_| None, each)
+    }
+
+    /// The same, with an order before any tick, whose number `order` is told. A hold has to be
+    /// resumed.
+    ///
+    /// # Errors
+    /// See [`Controller::feed`].
+    pub fn run_with_orders(
+        &mut self,
+        program: &str,
+        mut order: impl FnMut(usize) -> Option<Order>,
+        mut each: impl FnMut(&Setpoint),
+    ) -> Result<(), LineError> {
         let mut lines = program.lines();
         let mut more = true;
-        loop {
-            while more && self.planner.has_room() {
-                let Some(line) = lines.next() else {
-                    more = false;
-                    break;
-                };
-                let accepted = self.planner.line(line.as_bytes())?;
-                if let Some(pose) = accepted.reference {
-                    self.motion.obey(Order::Place(pose));
-                }
-                more = !accepted.ended;
+        for tick in 0.. {
+            if more {
+                more = self.feed(&mut lines)?;
             }
-            self.motion.obey(Order::Start);
-            let setpoint = self.motion.tick();
+            self.obey(Order::Start);
+            if let Some(order) = order(tick) {
+                self.obey(order);
+            }
+            let setpoint = self.tick();
+            if setpoint.state == MotionState::Paused {
+                self.obey(Order::Resume);
+                continue;
+            }
             each(&setpoint);
             if setpoint.state == MotionState::Idle && !more {
-                return Ok(());
+                break;
             }
         }
+        Ok(())
     }
 }

@@ -273,13 +273,13 @@ impl<'q> Motion<'q> {
         let [x, y, z, c] = self.filters.lines.process(&self.kernel, raw.chord);
         let [bow_x, bow_y] = self.arcs.step(&mut self.filters.arcs, &self.kernel, &raw);
         let newest = [x.wrapping_add(bow_x), y.wrapping_add(bow_y), z, c];
-        self.stood_for = if raw.moves {
+        self.stood_for = if raw.moved {
             0
         } else {
             self.stood_for.saturating_add(1)
         };
         // the filters and then the two ticks of history have settled
-        if self.stood_for > self.kernel.length_ticks() + 2 {
+        if self.stood_for > self.kernel.length_ticks() + 1 {
             self.come_to_rest();
             return self.history[1];
         }

@@ -17,8 +17,8 @@ pub struct RawStep<'s> {
     pub began: Option<&'s Bow>,
     /// Progress along the segment under way in 2^-30; 0 while standing.
     pub progress: i32,
-    /// Whether the raw point is moving after this tick.
-    pub moves: bool,
+    /// Whether the raw point moved in this tick.
+    pub moved: bool,
 }
 
 /// The rates that the raw path is walked at.
@@ -147,6 +147,15 @@ impl Way {
     }
 }
 
+/// What became of the segment under way in a tick.
+struct Gone {
+    ended: bool,
+    /// Whether the raw point moved.
+    moved: bool,
+    /// What is left of the tick.
+    left: TickTime,
+}
+
 /// Walks the queued segments, one tick at a time.
 ///
 /// Segments begin and end between ticks: what is left of a tick after a segment's end
@@ -246,8 +255,11 @@ impl<'q> Walker<'q> {
 
     /// Walks on for one tick. An arc begins only where `arc_may_begin`.
     pub fn step(&mut self, kernel: &Kernel, arc_may_begin: bool) -> RawStep<'_> {
-        let mut left = ONE_TICK;
-        let ended = self.go_on(kernel, &mut left);
+        let Gone {
+            ended,
+            mut moved,
+            left,
+        } = self.go_on(kernel);
         let segment = self.queue.segment();
         let mut began = false;
         if let Walk::Standing(stand) = &mut self.walk {
@@ -256,6 +268,7 @@ impl<'q> Walker<'q> {
             match way {
                 Some(way) => {
                     self.walk = Walk::Moving(way);
+                    moved |= next.is_some_and(RawSegment::moves);
                     began = true;
                 }
                 None => stand.time = stand.time.wrapping_add(left),
@@ -266,12 +279,11 @@ impl<'q> Walker<'q> {
             ended,
             began: None,
             progress: 0,
-            moves: false,
+            moved,
         };
         if let (Walk::Moving(way), Some(segment)) = (&self.walk, segment) {
             step.progress = (way.progress.min(WHOLE) >> 32) as i32;
             step.chord = segment.chord_point(step.progress);
-            step.moves = !self.held && segment.moves();
             if began {
                 step.began = segment.bow.as_ref();
             }
@@ -280,26 +292,38 @@ impl<'q> Walker<'q> {
         step
     }
 
-    /// Goes on along the segment under way for a tick, or to its end if that comes before:
-    /// `true`, with what is then `left` of the tick.
-    fn go_on(&mut self, kernel: &Kernel, left: &mut TickTime) -> bool {
+    /// Goes on along the segment under way for a tick, or to its end if that comes before.
+    fn go_on(&mut self, kernel: &Kernel) -> Gone {
         let (Walk::Moving(way), Some(segment)) = (&mut self.walk, self.queue.segment()) else {
-            return false;
+            return Gone {
+                ended: false,
+                moved: false,
+                left: ONE_TICK,
+            };
         };
         if self.held {
             way.since_corner = way.since_corner.wrapping_add(ONE_TICK);
-            return false;
+            return Gone {
+                ended: false,
+                moved: false,
+                left: 0,
+            };
         }
+        let moved = segment.moves();
         let rate = way.rate(kernel, segment, self.rates.of(segment));
         let share = rate.raw(ONE_TICK);
         if way.remaining > share {
             way.advance(segment, share, ONE_TICK);
-            return false;
+            return Gone {
+                ended: false,
+                moved,
+                left: 0,
+            };
         }
-        *left = rate.real(share - way.remaining);
+        let left = rate.real(share - way.remaining);
         self.point = segment.target;
-        self.walk = Walk::Standing(if segment.moves() {
-            let since_corner = way.since_corner.wrapping_add(ONE_TICK - *left);
+        self.walk = Walk::Standing(if moved {
+            let since_corner = way.since_corner.wrapping_add(ONE_TICK - left);
             Stand {
                 time: 0,
                 least: if segment.top_rate > Rate::ONE {
@@ -313,7 +337,11 @@ impl<'q> Walker<'q> {
             Stand::AT_REST
         });
         self.queue.pop();
-        true
+        Gone {
+            ended: true,
+            moved,
+            left,
+        }
     }
 }
 

@@ -1,0 +1,117 @@
+//! What these tests share.
+
+use std::collections::BTreeMap;
+
+use host_tests::checker::{CheckOptions, Program, Report, TraceRow, check};
+use host_tests::oracle::Prefilter;
+use host_tests::software_loop::Controller;
+use host_tests::vector::{norm, scale, sub, xyz};
+use planner_core::config::{Robot, RobotConfig};
+use planner_core::motion::{DelayLines, Order, Setpoint};
+use planner_core::prefilter::Kind;
+use planner_core::queue::SegmentQueue;
+
+pub const CORNER_PATH: &str = include_str!("../../programs/corner-path.gcode");
+
+pub const TICK_S: f64 = 1e-3;
+
+pub fn robot(change: impl FnOnce(&mut RobotConfig)) -> Robot {
+    let mut config = RobotConfig::default();
+    change(&mut config);
+    Robot::new(&config).expect("the settings are within range")
+}
+
+/// The oracle's prefilter of a robot.
+pub fn prefilter(robot: &Robot) -> Prefilter {
+    let config = robot.config.prefilter;
+    Prefilter::named(
+        config.kind.name(),
+        config.frequency_hz.into(),
+        config.damping.into(),
+    )
+    .expect("both have the same names")
+}
+
+/// Orders before the ticks of these numbers.
+pub type Orders = BTreeMap<usize, Order>;
+
+/// Runs a program to its end with orders on the way.
+pub fn setpoints(robot: &Robot, program: &str, orders: &Orders) -> Vec<Setpoint> {
+    let mut queue = SegmentQueue::new();
+    let mut filters = Box::new(DelayLines::new());
+    let mut all = Vec::new();
+    Controller::new(robot, &mut queue, &mut filters)
+        .run_with_orders(
+            program,
+            |tick| orders.get(&tick).copied(),
+            |setpoint| all.push(*setpoint),
+        )
+        .expect("the program runs");
+    all
+}
+
+pub fn pose(setpoint: &Setpoint) -> [f64; 4] {
+    let pose = setpoint.pose;
+    [
+        pose.x.to_num(),
+        pose.y.to_num(),
+        pose.z.to_num(),
+        pose.c.to_num(),
+    ]
+}
+
+pub fn rows(setpoints: &[Setpoint]) -> Vec<TraceRow> {
+    setpoints
+        .iter()
+        .zip(0_u32..)
+        .map(|(setpoint, tick)| TraceRow {
+            time_s: f64::from(tick) * TICK_S,
+            pose: pose(setpoint),
+        })
+        .collect()
+}
+
+/// What the checker finds, with the robot's own tolerance and rapids.
+pub fn report(robot: &Robot, program: &str, setpoints: &[Setpoint]) -> Report {
+    let program = Program::parse(program).expect("the checker reads it");
+    let options = CheckOptions {
+        rapid_mm_s: robot.config.rapid_mm_s.into(),
+        tolerance_mm: robot.config.corner_tolerance_mm.into(),
+        ..CheckOptions::default()
+    };
+    check(&program, &rows(setpoints), &options)
+}
+
+/// How far a polyline of samples may cut a path on which the velocity jumps by twice the
+/// feedrate: half of what the tool travels in a tick. A box makes that a micrometre.
+pub fn allowance_mm(kind: Kind, feed_mm_s: f64) -> f64 {
+    match kind {
+        Kind::None | Kind::Zv | Kind::Zvd | Kind::Ei => feed_mm_s * TICK_S / 2.0,
+        Kind::Fir | Kind::FirZv | Kind::FirZvd => 1e-3,
+    }
+}
+
+/// The tool's velocity from each setpoint to the next, in mm/s.
+pub fn velocities(setpoints: &[Setpoint]) -> Vec<[f64; 3]> {
+    setpoints
+        .windows(2)
+        .map(|pair| {
+            let step = sub(xyz(pose(&pair[1])), xyz(pose(&pair[0])));
+            scale(1.0 / TICK_S, step)
+        })
+        .collect()
+}
+
+/// The largest speed of the tool in mm/s.
+pub fn top_speed_mm_s(setpoints: &[Setpoint]) -> f64 {
+    velocities(setpoints)
+        .into_iter()
+        .map(norm)
+        .fold(0.0, f64::max)
+}
+
+/// Whether a setpoint says that nothing moves.
+pub fn is_at_rest(setpoint: &Setpoint) -> bool {
+    let joints = &setpoint.joints;
+    joints.velocity == [0.0; 4] && joints.acceleration == [0.0; 4]
+}
