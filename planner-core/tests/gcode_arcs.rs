@@ -3,7 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use planner_core::gcode::{
-    Command, Defaults, Error, Interpreter, Line, LineBuffer, Move, Offsets, Received,
+    Command, Defaults, Error, Interpreter, Line, LineBuffer, MAX_ACTIONS_A_LINE, Move, Offsets,
+    Received,
 };
 use planner_core::path::{Arc, Shape};
 use planner_core::pose::Pose;
@@ -250,6 +251,17 @@ proptest! {
             let position = before.position().unwrap();
             match run(&mut interpreter, text) {
                 Ok(command) => {
+                    let actions = [
+                        command.robot.is_some(),
+                        command.outputs.is_some(),
+                        command.dwell_s.is_some(),
+                        command.via.is_some(),
+                        command.motion.is_some(),
+                        command.outputs_after.is_some(),
+                        command.flow.is_some(),
+                    ];
+                    let actions = actions.into_iter().filter(|is_there| *is_there).count();
+                    prop_assert!(actions <= MAX_ACTIONS_A_LINE, "{text}");
                     let mut end = position;
                     for motion in command.moves() {
                         prop_assert_eq!(motion.path.start, end);
@@ -278,7 +290,7 @@ proptest! {
         for byte in bytes {
             if buffer.push(byte) == Received::Line
                 && let Ok(line) = Line::parse(buffer.line())
-                && let Ok(interpreted) = interpreter.interpret(&line)
+                && let Ok(interpreted) = interpreter.interpret(&line).or(interpreter.jog(&line))
             {
                 interpreter.commit(&interpreted);
             }

@@ -191,6 +191,22 @@ fn offsets_show_as_poses_and_say_what_they_change() {
 }
 
 #[test]
+fn only_what_a_program_can_name_is_stored() {
+    let mut interpreter = after(&[]);
+    interpreter.set_position(Some(pose(0.0, 0.0, 0.0, 1500.0)));
+    for text in ["G28.1", "G30.1", "G92 C0", "G10 L20 P1 C0"] {
+        assert_eq!(
+            run(&mut interpreter, text).unwrap_err().code(),
+            61,
+            "{text}"
+        );
+    }
+    run(&mut interpreter, "G10 L20 P1 X5 C60").unwrap();
+    let bytes = interpreter.offsets().to_bytes();
+    assert!(Offsets::from_bytes(&bytes).is_some());
+}
+
+#[test]
 fn stored_offsets_outlast_power_off() {
     let interpreter = after(&[
         "G0 X10.000000001 Y-20",

@@ -62,6 +62,17 @@ fn a_corner_stays_below_60_000_instructions() {
 }
 
 #[test]
+fn a_line_is_read_below_6000_instructions() {
+    let Some(counts) = counts() else { return };
+    for name in ["gcode/line", "gcode/feed"] {
+        let count = counts[name];
+        assert!((1000..=6000).contains(&count), "{name}: {count}");
+    }
+    // the geometry in f64, in software
+    assert!(counts["gcode/arc"] <= 20_000, "{counts:?}");
+}
+
+#[test]
 fn lines_are_planned_at_a_thousand_a_second() {
     // 170 MHz, up to 1.5 cycles an instruction
     const INSTRUCTIONS_S: u64 = 113_000_000;

@@ -48,7 +48,14 @@ pub(super) fn offset_change(
             Ok(Some(OffsetChange::G92(g92)))
         }
         Some(NonModal::ResetOffset) => Ok(Some(OffsetChange::G92(ORIGIN))),
-        Some(NonModal::Store(row)) => Ok(Some(OffsetChange::Stored(row, *position?.exact()))),
+        Some(NonModal::Store(row)) => {
+            // A position that homing found may be beyond what a program can name.
+            let stored = *position?.exact();
+            for (axis, value) in stored.iter().enumerate() {
+                checked(axis, value.to_nano())?;
+            }
+            Ok(Some(OffsetChange::Stored(row, stored)))
+        }
         Some(NonModal::Dwell | NonModal::Go(_) | NonModal::MachineCoordinates) | None => Ok(None),
     }
 }
