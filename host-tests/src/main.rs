@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use host_tests::commands::{compare, corner, demo, forward, inverse, prefilter, run};
+use host_tests::commands::{compare, corner, demo, emulate, forward, inverse, prefilter, run};
 
 /// Motion control that leaves the robot still: plans, runs and measures path programs.
 ///
@@ -21,6 +21,8 @@ struct Cli {
 enum Command {
     /// Runs a program on the simulated robot and measures what it did.
     Run(run::RunArgs),
+    /// Starts the emulated controller, for any sender to connect to.
+    Emulate(emulate::EmulateArgs),
     /// Runs a program with every prefilter and shows the figures side by side.
     Compare(compare::CompareArgs),
     /// Solves one corner: how much two segments may overlap within a tolerance.
@@ -37,6 +39,7 @@ fn main() -> ExitCode {
     let done = match Cli::parse().command {
         None => demo::execute(),
         Some(Command::Run(args)) => run::execute(&args),
+        Some(Command::Emulate(args)) => emulate::execute(&args),
         Some(Command::Compare(args)) => compare::execute(&args),
         Some(Command::Corner(args)) => corner::execute(&args),
         Some(Command::Prefilter(args)) => prefilter::execute(&args),
@@ -45,6 +48,7 @@ fn main() -> ExitCode {
     };
     match done {
         // A reader that has seen enough is no error.
+        Ok(text) if text.is_empty() => ExitCode::SUCCESS,
         Ok(text) => match writeln!(io::stdout(), "{text}") {
             Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
                 eprintln!("stillpoint: the answer cannot be written ({error})");

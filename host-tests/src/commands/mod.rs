@@ -3,6 +3,7 @@
 pub mod compare;
 pub mod corner;
 pub mod demo;
+pub mod emulate;
 pub mod forward;
 pub mod inverse;
 mod model_args;

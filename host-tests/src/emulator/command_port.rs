@@ -28,7 +28,7 @@ pub enum Answer {
 
 /// What the firmware says, apart from empty lines.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum Said {
+pub enum Said {
     Answer(Answer),
     Status(String),
     Banner,
@@ -134,7 +134,7 @@ fn unforeseen(said: &Said) -> EmulatorError {
     EmulatorError::Unforeseen(format!("{said:?}"))
 }
 
-fn parse(line: &str) -> Result<Said, EmulatorError> {
+pub fn parse(line: &str) -> Result<Said, EmulatorError> {
     let inside = |open, close| {
         line.strip_prefix(open)
             .and_then(|rest: &str| rest.strip_suffix(close))

@@ -1,11 +1,13 @@
 //! The firmware on an emulated Cortex-M4F, run by QEMU.
 //!
 //! [`build_image`] makes the image, [`Emulator`] boots it and talks to its two
-//! serial ports, [`measure_instructions`] runs the image that counts instructions.
+//! serial ports, [`EmulatedBoard`] leaves them to others, [`measure_instructions`]
+//! runs the image that counts instructions.
 
 mod command_port;
 mod image;
 mod instructions;
+mod ports;
 mod qemu;
 mod run;
 mod setpoint_port;
@@ -13,6 +15,7 @@ mod setpoint_port;
 pub use command_port::Answer;
 pub use image::{Board, build_image};
 pub use instructions::measure_instructions;
+pub use ports::EmulatedBoard;
 pub use qemu::{Pace, check_qemu};
 pub use run::{Emulator, EmulatorRun, StackUse, TickStatistics};
 
