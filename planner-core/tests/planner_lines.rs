@@ -2,9 +2,9 @@
 
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::gcode::{Line, MAX_ACTIONS_A_LINE};
-use planner_core::motion::{DelayLines, Motion, MotionState};
+use planner_core::motion::{DelayLines, Motion, MotionState, Order};
 use planner_core::planner::{Accepted, LineError, Planner};
-use planner_core::raw::SegmentQueue;
+use planner_core::queue::SegmentQueue;
 
 fn robot() -> Robot {
     let mut config = RobotConfig::default();
@@ -27,10 +27,10 @@ fn ticks(program: &[&str]) -> u32 {
         let accepted = planner.line(line.as_bytes());
         let accepted = accepted.unwrap_or_else(|error| panic!("{line}: {error}"));
         if let Some(pose) = accepted.reference {
-            motion.place(pose);
+            motion.obey(Order::Place(pose));
         }
     }
-    motion.start();
+    motion.obey(Order::Start);
     let mut ticks = 0;
     while motion.tick().state != MotionState::Idle {
         ticks += 1;
@@ -97,9 +97,12 @@ fn there_is_room_for_all_that_a_line_can_ask_for() {
         planner.line(b"G0 X300 Y0").unwrap();
         planner.line(b"G30.1").unwrap();
         planner.line(b"G0 X310").unwrap();
-        while planner.has_room() {
-            planner.line(b"M3 G30 Z5 M0").unwrap();
-            planner.line(b"M5 G4 P1 G0 X310 M0").unwrap();
+        let lines = [b"M3 G30 Z5 M0".as_slice(), b"M5 G4 P1 G0 X310 M0"];
+        for line in lines.into_iter().cycle() {
+            if !planner.has_room() {
+                break;
+            }
+            planner.line(line).unwrap();
         }
         let free = planner.free_places();
         assert!(free < MAX_ACTIONS_A_LINE);

@@ -109,9 +109,3 @@ pub fn top_speed_mm_s(setpoints: &[Setpoint]) -> f64 {
         .map(norm)
         .fold(0.0, f64::max)
 }
-
-/// Whether a setpoint says that nothing moves.
-pub fn is_at_rest(setpoint: &Setpoint) -> bool {
-    let joints = &setpoint.joints;
-    joints.velocity == [0.0; 4] && joints.acceleration == [0.0; 4]
-}
