@@ -199,6 +199,29 @@ fn outputs_switch_where_the_tool_has_come_to_rest() {
 }
 
 #[test]
+fn a_reset_keeps_what_the_gripper_holds_and_takes_the_prefilter_back() {
+    with_robot(|desk| {
+        desk.send(b"M3\nM100 P1 Q20\nG1 X300 F6000\n");
+        desk.run_ms(800);
+        assert_eq!(desk.setpoint().outputs, 1);
+        desk.send(b"\x18");
+        assert!(desk.run_until("Alarm"));
+        desk.ask("$X");
+        assert_eq!(desk.setpoint().outputs, 1);
+        assert!(desk.ask("$G").contains("M3"));
+        desk.ask("M5");
+        assert!(desk.run_until("Idle"));
+        assert_eq!(desk.setpoint().outputs, 0);
+        // With FIR-ZVD again a move of 5 mm takes more than its prefilter's 0.3 s.
+        desk.heard();
+        desk.ask("G91 G1 X5 F6000");
+        desk.run_ms(60);
+        desk.run_ms(250);
+        assert_eq!(desk.state(), "Run");
+    });
+}
+
+#[test]
 fn silence_holds_a_running_program() {
     with_robot(|desk| {
         assert!(desk.ask("$link-timeout=0.5").contains("ok"));

@@ -139,11 +139,19 @@ impl Interpreter {
     }
 
     /// Back to the state after power-up, as Grbl's soft reset: position, G54 to G59, G28
-    /// and G30 stay, G92 and the tool length offset do not.
+    /// and G30 stay, G92 and the tool length offset do not. Unlike Grbl's spindle the outputs
+    /// stay too: a reset must not drop what the gripper holds.
     pub const fn reset(&mut self) {
-        let position = self.modal.position;
+        let Modal {
+            position,
+            spindle,
+            coolant,
+            ..
+        } = self.modal;
         self.modal = Modal::new(&self.defaults);
         self.modal.position = position;
+        self.modal.spindle = spindle;
+        self.modal.coolant = coolant;
         self.offsets.reset();
     }
 

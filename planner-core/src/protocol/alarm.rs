@@ -11,27 +11,11 @@ pub enum Alarm {
     SoftLimit,
     /// 3: a reset stopped the motion. The position is kept.
     ResetInMotion,
-    /// 6: a reset stopped homing.
-    HomingReset,
-    /// 7: the safety door stopped homing.
-    HomingDoor,
-    /// 8: a limit input did not clear when homing backed off.
-    HomingPullOff,
-    /// 9: homing found no limit input within the joint's travel.
-    HomingNoLimit,
 }
 
 impl Alarm {
     /// Every alarm, by number.
-    pub const ALL: [Self; 7] = [
-        Self::HardLimit,
-        Self::SoftLimit,
-        Self::ResetInMotion,
-        Self::HomingReset,
-        Self::HomingDoor,
-        Self::HomingPullOff,
-        Self::HomingNoLimit,
-    ];
+    pub const ALL: [Self; 3] = [Self::HardLimit, Self::SoftLimit, Self::ResetInMotion];
 
     /// The number in `ALARM:N`, Grbl's.
     #[must_use]
@@ -40,10 +24,6 @@ impl Alarm {
             Self::HardLimit => 1,
             Self::SoftLimit => 2,
             Self::ResetInMotion => 3,
-            Self::HomingReset => 6,
-            Self::HomingDoor => 7,
-            Self::HomingPullOff => 8,
-            Self::HomingNoLimit => 9,
         }
     }
 
@@ -61,10 +41,6 @@ impl fmt::Display for Alarm {
             Self::HardLimit => "A limit input became active in motion: free the arm then reset",
             Self::SoftLimit => "A target is out of reach: correct the program then reset",
             Self::ResetInMotion => "A reset stopped the motion: the position is kept; unlock",
-            Self::HomingReset => "A reset stopped homing: home again",
-            Self::HomingDoor => "The safety door stopped homing: close it then home again",
-            Self::HomingPullOff => "A limit input did not clear: check its switch and the pull-off",
-            Self::HomingNoLimit => "Homing found no limit input: check the switches and the travel",
         })
     }
 }

@@ -593,7 +593,7 @@ impl Controller<'_> {
                     self.out(Out::Message("This board reads no encoders: set $1000=0"));
                 }
             }
-        } else if protocol.homing {
+        } else if protocol.start_locked {
             self.mode = Mode::Locked;
         }
         self.greet();
@@ -621,6 +621,7 @@ impl Controller<'_> {
         match after {
             AfterStop::Reset { in_motion } => {
                 self.planner.reset_modes();
+                self.forget_robot_words();
                 let was_locked = matches!(self.mode, Mode::Locked | Mode::Critical | Mode::Asleep);
                 self.mode = if in_motion || was_locked {
                     Mode::Locked
@@ -644,12 +645,22 @@ impl Controller<'_> {
                     Mode::Locked
                 };
                 self.out(Out::Alarm(alarm));
-                self.out(Out::Message(if alarm.needs_reset() {
-                    "Reset to continue"
-                } else {
-                    "'$H'|'$X' to unlock"
-                }));
+                if alarm.needs_reset() {
+                    self.out(Out::Message("Reset to continue"));
+                }
             }
+        }
+    }
+
+    /// Takes back what M100 has changed, as a reset does with all modes.
+    fn forget_robot_words(&mut self) {
+        if self.planner.robot().config == self.settings.robot {
+            return;
+        }
+        // A robot has been made of these settings before.
+        if let Ok(robot) = Robot::new(&self.settings.robot) {
+            self.planner.set_robot(&robot);
+            self.out(Out::Robot);
         }
     }
 
@@ -994,7 +1005,7 @@ impl Controller<'_> {
             return;
         }
         let protocol = settings.protocol;
-        if protocol.soft_limit_alarm && !(protocol.homing || protocol.encoders) {
+        if protocol.soft_limit_alarm && !protocol.encoders {
             return self.refuse(Refusal::SoftLimitsNeedPosition);
         }
         if self.adopt(&settings) {

@@ -7,7 +7,7 @@ use core::fmt;
 pub enum Refusal {
     /// 3: no `$` command of that name, or one that is not complete.
     BadDollar,
-    /// 5: homing, and the settings have none.
+    /// 5: homing, without encoders that tell the position.
     NoHoming,
     /// 7: the settings could not be kept, and are those of the start again after a restart.
     NotStored,
@@ -15,7 +15,7 @@ pub enum Refusal {
     NotIdle,
     /// 9: locked by an alarm or by a jog.
     Locked,
-    /// 10: alarms on targets out of reach need homing or encoders to know the position.
+    /// 10: alarms on targets out of reach need encoders to know the position.
     SoftLimitsNeedPosition,
     /// 11: more characters than a line may have.
     LineTooLong,
@@ -60,7 +60,7 @@ pub const ERRORS: [(u8, &str); 50] = [
     (4, "A value is negative that must not be"),
     (
         5,
-        "Homing is off: set $22=1 or declare encoders with $1000=1",
+        "There are no encoders to home by: set $1000=1 if the drives have them",
     ),
     (
         7,
@@ -70,7 +70,7 @@ pub const ERRORS: [(u8, &str); 50] = [
     (9, "Locked by an alarm or a jog: unlock with $X or wait"),
     (
         10,
-        "Alarms on targets out of reach need a known position: enable homing or encoders first",
+        "Alarms on targets out of reach need encoders: set $1000=1 first",
     ),
     (11, "The line is too long: split it"),
     (

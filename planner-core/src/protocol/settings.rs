@@ -22,8 +22,8 @@ pub struct ProtocolConfig {
     pub soft_limit_alarm: bool,
     /// A limit input that becomes active in motion raises alarm 1.
     pub hard_limits: bool,
-    /// The position is found by homing; until then the controller is locked.
-    pub homing: bool,
+    /// The controller is locked at the start, until `$H` or `$X`.
+    pub start_locked: bool,
     /// The drives have absolute encoders, which tell the position from the start.
     pub encoders: bool,
     /// After an `error:N` all further lines are refused until `$ACK`.
@@ -40,7 +40,7 @@ impl Default for ProtocolConfig {
             report_joints: false,
             soft_limit_alarm: false,
             hard_limits: false,
-            homing: false,
+            start_locked: false,
             encoders: false,
             error_safe: false,
             link_timeout_s: 0.0,
@@ -176,7 +176,14 @@ pub const SETTINGS: [Setting; 28] = [
         "",
         Kind::Switch,
     ),
-    setting(22, "homing", SAFETY, "Locked until homed", "", Kind::Switch),
+    setting(
+        22,
+        "start-locked",
+        SAFETY,
+        "Locked at the start",
+        "",
+        Kind::Switch,
+    ),
     setting(
         1000,
         "encoders",
@@ -510,7 +517,7 @@ impl Settings {
             "report-joints" => Place::Switch(&mut protocol.report_joints),
             "soft-limit-alarm" => Place::Switch(&mut protocol.soft_limit_alarm),
             "hard-limits" => Place::Switch(&mut protocol.hard_limits),
-            "homing" => Place::Switch(&mut protocol.homing),
+            "start-locked" => Place::Switch(&mut protocol.start_locked),
             "encoders" => Place::Switch(&mut protocol.encoders),
             "error-safe" => Place::Switch(&mut protocol.error_safe),
             "link-timeout" => Place::Number(&mut protocol.link_timeout_s),
@@ -585,8 +592,8 @@ mod tests {
             ("speed=1", SettingError::Unknown),
             ("report", SettingError::Value),
             ("report=4", SettingError::Value),
-            ("homing=2", SettingError::Value),
-            ("homing=0.5", SettingError::Value),
+            ("start-locked=2", SettingError::Value),
+            ("start-locked=0.5", SettingError::Value),
             ("elbow=up", SettingError::Value),
             ("prefilter=-1", SettingError::Value),
             ("tolerance=NaN", SettingError::Value),
@@ -628,7 +635,7 @@ mod tests {
             text("elbow"),
             "[SETTING:1012|3|Elbow side||3|left,right|||0|0]"
         );
-        assert_eq!(text("22"), "[SETTING:22|1|Locked until homed||0||||0|0]");
+        assert_eq!(text("22"), "[SETTING:22|1|Locked at the start||0||||0|0]");
         assert_eq!(
             text("tolerance"),
             "[SETTING:11|4|Corner tolerance|mm|6|###0.000|0|100|0|0]"
