@@ -5,9 +5,13 @@
 //! [`Method`] give the [`Zeros`] of two prefilters, one to accelerate through and one to
 //! decelerate through, and these the [`Profile`].
 //!
+//! Where a named prefilter is wanted instead, [`choose`] takes the shortest one whose residual
+//! keeps a limit over everything that the mode may be.
+//!
 //! Tajima stands for: Tajima, Miyashita, Yoshioka: velocity profile generation for industrial robots
 //! considering natural frequency variations. Int. J. Automation Technol.
 
+mod automatic;
 mod course;
 mod map;
 mod method;
@@ -15,6 +19,7 @@ mod profile;
 mod ramp;
 mod zeros;
 
+pub use automatic::{Choice, ChoiceError, Requirement, choose};
 pub use course::Course;
 pub use map::{MAP_NODES, MapError, MapNode, ModeMap, ModeMapConfig};
 pub use method::{Method, MethodChoice, Reason};
