@@ -182,7 +182,8 @@ impl Profile {
         let zeros_at = |feed_mm_s| Zeros::new(course, feed_mm_s, method);
         let attains =
             |feed_mm_s: f64| feed_mm_s <= attainable_mm_s(course.length_mm, &zeros_at(feed_mm_s));
-        if attains(feed_mm_s) {
+        let depends_on_feed = matches!(method, Method::B | Method::Hybrid);
+        if !depends_on_feed || attains(feed_mm_s) {
             return Ok(zeros_at(feed_mm_s));
         }
         let (mut low, mut high) = (0.0, feed_mm_s);
