@@ -4,7 +4,9 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use host_tests::commands::{compare, corner, demo, emulate, forward, inverse, prefilter, run};
+use host_tests::commands::{
+    compare, corner, demo, emulate, forward, inverse, prefilter, profile, run,
+};
 
 /// Motion control that leaves the robot still: plans, runs and measures path programs.
 ///
@@ -29,6 +31,8 @@ enum Command {
     Corner(corner::CornerArgs),
     /// Shows how long a prefilter is and how much vibration it leaves.
     Prefilter(prefilter::PrefilterArgs),
+    /// Plans one move whose mode changes along its way, and simulates what the mode does.
+    Profile(profile::ProfileArgs),
     /// From a pose to the joints, in the microcontroller's arithmetic.
     Inverse(inverse::InverseArgs),
     /// From the joints to a pose, in the microcontroller's arithmetic.
@@ -43,6 +47,7 @@ fn main() -> ExitCode {
         Some(Command::Compare(args)) => compare::execute(&args),
         Some(Command::Corner(args)) => corner::execute(&args),
         Some(Command::Prefilter(args)) => prefilter::execute(&args),
+        Some(Command::Profile(args)) => profile::execute(&args),
         Some(Command::Inverse(args)) => inverse::execute(&args),
         Some(Command::Forward(args)) => forward::execute(&args),
     };

@@ -14,6 +14,7 @@ pub mod motion;
 pub mod path;
 pub mod planner;
 pub mod pose;
+pub mod posture;
 pub mod prefilter;
 pub mod protocol;
 pub mod queue;

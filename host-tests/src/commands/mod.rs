@@ -9,6 +9,7 @@ pub mod inverse;
 mod model_args;
 pub mod output;
 pub mod prefilter;
+pub mod profile;
 pub mod run;
 mod scenario_args;
 

@@ -7,6 +7,7 @@
 
 pub mod corner;
 pub mod path;
+pub mod posture;
 pub mod prefilter;
 
 pub use corner::{Corner, CornerSolution, Leg};

@@ -7,10 +7,12 @@ mod canvas;
 mod feedrate;
 mod path;
 mod polyline;
+mod profile;
 mod vibration;
 
 use anyhow::Result;
 
+use crate::commands::profile::SimulatedMove;
 use crate::paired_run::PairedRun;
 
 /// Draws all pictures: file names and their text.
@@ -23,4 +25,12 @@ pub fn draw(run: &PairedRun) -> Result<Vec<(&'static str, String)>> {
         ("feedrate.svg", feedrate::draw(run)?),
         ("vibration.svg", vibration::draw(run)?),
     ])
+}
+
+/// Draws the picture of a profile.
+///
+/// # Errors
+/// Never in practice: the drawing goes to memory.
+pub fn draw_profile(simulated: &SimulatedMove) -> Result<String> {
+    profile::draw(simulated)
 }

@@ -9,6 +9,7 @@ pub mod drive;
 pub mod full;
 pub mod ideal;
 pub mod mode;
+pub mod travelling;
 
 #[cfg(test)]
 mod full_tests;
@@ -18,3 +19,4 @@ pub use config::{FullConfig, ModeMap};
 pub use full::{FullPlant, JointSetpoint, PlantOutput};
 pub use ideal::{IdealOutput, IdealPlant};
 pub use mode::Mode;
+pub use travelling::{Answer, Base, Travel};

@@ -1,4 +1,4 @@
-//! `corner`, `prefilter`, `inverse` and `forward`: keys and values.
+//! `corner`, `prefilter`, `profile`, `inverse` and `forward`: keys and values.
 
 use serde_json::Value;
 
@@ -99,6 +99,91 @@ fn prefilter_gives_length_residual_and_band() {
     ]);
     near(&ei, "band_low_hz", 8.003, 1e-2);
     near(&ei, "band_high_hz", 11.997, 1e-2);
+}
+
+fn profile(start: &str, end: &str, method: &str) -> Vec<String> {
+    let args = [
+        "profile",
+        "--length",
+        "100",
+        "--feed",
+        "50",
+        "--start-frequency",
+        start,
+        "--end-frequency",
+        end,
+        "--damping",
+        "0.05",
+        "--method",
+        method,
+    ];
+    args.map(str::to_owned).to_vec()
+}
+
+#[test]
+fn profile_gives_zeros_and_the_published_overshoot() {
+    let at = |start, end, method| {
+        let mut args = profile(start, end, method);
+        args.push("--json".into());
+        let args: Vec<_> = args.iter().map(String::as_str).collect();
+        json(&args)
+    };
+    let found = at("8", "20", "hybrid");
+    assert_eq!(
+        keys(&found),
+        [
+            "f1_hz",
+            "f2_hz",
+            "f3_hz",
+            "f4_hz",
+            "feed_used_mm_s",
+            "overshoot_accelerating_percent",
+            "overshoot_decelerating_percent",
+            "settling_accelerating_s",
+            "settling_decelerating_s",
+            "total_s"
+        ]
+    );
+    near(&found, "f1_hz", 8.1773, 1e-3);
+    near(&found, "f2_hz", 8.5361, 1e-3);
+    near(&found, "f3_hz", 20.0, 0.0);
+    near(&found, "overshoot_accelerating_percent", 0.460, 2e-3);
+    near(&found, "settling_accelerating_s", 0.526, 1e-3);
+    let found = at("20", "8", "b");
+    near(&found, "overshoot_decelerating_percent", 0.710, 2e-3);
+    near(&found, "settling_decelerating_s", 0.794, 1e-3);
+    let found = at("8", "20", "A");
+    near(&found, "feed_used_mm_s", 50.0, 0.0);
+    near(&found, "total_s", 2.175, 1e-12);
+}
+
+#[test]
+fn profile_draws_its_picture_and_says_what_the_move_gets() {
+    let here = tempfile::TempDir::new().unwrap();
+    let out = here.path().join("out");
+    let mut args = profile("8", "20", "fir");
+    args.extend(["--out".to_owned(), out.display().to_string()]);
+    let args: Vec<_> = args.iter().map(String::as_str).collect();
+    let output = super::stillpoint(&args).output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success());
+    assert!(said.contains("2.149 %") && said.contains("0.936"), "{said}");
+    assert!(said.contains("gets\nhybrid: the mode settles"), "{said}");
+    let svg = std::fs::read_to_string(out.join("profile.svg")).unwrap();
+    assert!(svg.starts_with("<svg") && svg.contains("8 to 20 Hz"));
+    for (flag, value, sentence) in [
+        ("--length", "0", "the length of 0 mm"),
+        ("--feed", "nan", "the feedrate of NaN mm/s"),
+        ("--end-frequency", "0", "the frequency of 0 Hz"),
+        ("--damping", "1", "the damping ratio of 1"),
+    ] {
+        let mut args = profile("8", "20", "fir");
+        let place = args.iter().position(|arg| arg == flag).unwrap();
+        args[place + 1] = value.into();
+        let args: Vec<_> = args.iter().map(String::as_str).collect();
+        let said = refusal(&args);
+        assert!(said.contains(sentence), "{said}");
+    }
 }
 
 #[test]

@@ -131,6 +131,18 @@ impl Prefilter {
         })
     }
 
+    /// Two boxes in cascade, given by their lengths in seconds: a second-order moving average,
+    /// with a zero at the inverse of each length.
+    ///
+    /// The shorter one filters first: the longer a box, the less it errs by taking its input
+    /// for straight from tick to tick.
+    #[must_use]
+    pub fn of_boxes([one_s, other_s]: [f64; 2]) -> Self {
+        Self {
+            stages: Vec::from_iter([one_s.min(other_s), one_s.max(other_s)].map(Stage::Box)),
+        }
+    }
+
     /// The stages in the order in which they filter.
     #[must_use]
     pub fn stages(&self) -> &[Stage] {
