@@ -424,7 +424,7 @@ const COMMANDS: &[Row] = &[
         "describes the alarms",
         NONE,
         "$EA",
-        &["[ALARMCODE:1||", "[ALARMCODE:9||", "ok"],
+        &["[ALARMCODE:1||", "[ALARMCODE:3||", "ok"],
     ),
     row(
         "$EE",
@@ -600,7 +600,7 @@ const REFUSALS: &[Row] = &[
     row("error:21", "", NONE, "G0 G1", &["error:21"]),
     row("error:22", "", THERE, "G1 X210", &["error:22"]),
     row("error:23", "", NONE, "G1.5", &["error:23"]),
-    row("error:24", "", THERE, "G28 G92 X1", &["error:24"]),
+    row("error:24", "", THERE, "G49 G0 X210", &["error:24"]),
     row("error:25", "", THERE, "G0 X1 X2", &["error:25"]),
     row("error:26", "", THERE, "G92", &["error:26"]),
     row("error:27", "", NONE, "N10000001", &["error:27"]),
@@ -653,6 +653,7 @@ const REFUSALS: &[Row] = &[
     ),
     row("error:76", "", THERE, "M100 P6 Q1", &["error:76"]),
     row("error:77", "", NONE, "$11=-1", &["error:77"]),
+    row("error:79", "", THERE, "M101", &["error:79"]),
     row("error:78", "", NONE, "$frequency=1.5", &["error:78"]),
 ];
 

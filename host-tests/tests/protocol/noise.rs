@@ -242,12 +242,10 @@ fn protected(lines: u32, seed: u64) -> Outcome {
         let end = lines + 3;
         let (mut next, mut acknowledged, mut now_ms, mut quiet_ms) = (1_u32, 1_u32, 0, 0);
         let (mut last_executed, mut banners) = (0_u32, desk.banners());
-        // Until M110 is acknowledged, no line is worth sending.
-        let mut syncing = true;
-        let sync = |there: &mut NoisyLink, now_ms, last: u32| {
-            there.send(now_ms, format!("\n{}", numbered(last, "M110")).as_bytes());
-        };
-        sync(&mut there, now_ms, 0);
+        // Until M110 has gone and all is quiet, no line is worth sending.
+        let (mut syncing, mut is_synced) = (true, false);
+        // Answers to come that are not those of numbered lines.
+        let mut stray = 0;
         let mut heard = Vec::new();
         while acknowledged < end {
             now_ms += 1;
@@ -291,26 +289,34 @@ fn protected(lines: u32, seed: u64) -> Outcome {
                         acknowledged = acknowledged.min(expected).max(1);
                     }
                 } else if line == "ok" {
-                    if syncing {
-                        syncing = false;
-                        next = acknowledged;
-                    } else {
+                    if stray > 0 {
+                        stray -= 1;
+                    } else if !syncing {
                         acknowledged = (acknowledged + 1).min(next);
                     }
                 } else if line.starts_with("Grbl") || line == "[MSG:Send M110 first]" {
                     outcome.resets += u32::from(line.starts_with("Grbl"));
-                    desk.send(b"$X\n");
                     syncing = true;
+                    is_synced = false;
                 }
             }
             quiet_ms = if news { 0 } else { quiet_ms + 1 };
             if quiet_ms > 300 {
-                desk.send(b"\n~$X\n");
-                next = acknowledged;
-                if syncing {
-                    sync(&mut there, now_ms, acknowledged - 1);
-                }
                 quiet_ms = 0;
+                // What was under way is over. A robot that is held or locked goes on.
+                stray = 2;
+                desk.send(b"~$X\n");
+                next = acknowledged;
+                if syncing && !is_synced {
+                    there.send(
+                        now_ms,
+                        format!("\n{}", numbered(acknowledged - 1, "M110")).as_bytes(),
+                    );
+                    is_synced = true;
+                } else {
+                    desk.send(b"\n");
+                    syncing = false;
+                }
             }
         }
         assert!(last_executed >= lines, "lines are missing at the end");

@@ -1001,7 +1001,10 @@ impl Controller<'_> {
         let mut settings = self.settings;
         if let Err(error) = settings.set_all(text) {
             self.out(Out::SettingRefused(error));
-            self.out(Out::Error(Refusal::BadDollar.code()));
+            self.out(Out::Error(match error {
+                SettingError::Unknown => Refusal::BadDollar.code(),
+                SettingError::Value => Refusal::BadValue.code(),
+            }));
             return;
         }
         let protocol = settings.protocol;
@@ -1023,7 +1026,7 @@ impl Controller<'_> {
                 Ok(robot) => self.planner.set_robot(&robot),
                 Err(error) => {
                     self.out(Out::RobotRefused(error));
-                    self.out(Out::Error(Refusal::BadDollar.code()));
+                    self.out(Out::Error(Refusal::NoRobot.code()));
                     return false;
                 }
             }

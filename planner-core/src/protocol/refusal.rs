@@ -25,6 +25,10 @@ pub enum Refusal {
     AfterAnError,
     /// 67: its line number is not the next; it or a line before it was lost on the way.
     OutOfOrder,
+    /// 77: a setting does not take this value.
+    BadValue,
+    /// 78: the settings would not make a robot.
+    NoRobot,
 }
 
 impl Refusal {
@@ -42,6 +46,8 @@ impl Refusal {
             Self::StartupTooLong => 14,
             Self::AfterAnError => 66,
             Self::OutOfOrder => 67,
+            Self::BadValue => 77,
+            Self::NoRobot => 78,
         }
     }
 }
@@ -109,7 +115,7 @@ pub const ERRORS: [(u8, &str); 50] = [
     (62, "The position is unknown: home or give a first point"),
     (63, "The checksum is not the line's: send it again"),
     (64, "The line has too many words: split it"),
-    (65, "The line asks for two things: split it"),
+    (65, "A command that needs a line of its own: split it"),
     (
         66,
         "Not executed after the error before: acknowledge with $ACK",
@@ -142,10 +148,7 @@ pub const ERRORS: [(u8, &str); 50] = [
         78,
         "The settings do not make a robot: see the message before",
     ),
-    (
-        79,
-        "The elbow cannot change here: the other side does not reach this point",
-    ),
+    (79, "The elbow cannot change its side inside a program"),
 ];
 
 /// The sentence for an `error:N`.
