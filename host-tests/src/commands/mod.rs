@@ -4,6 +4,7 @@ pub mod compare;
 pub mod corner;
 pub mod demo;
 pub mod emulate;
+mod failure;
 pub mod forward;
 pub mod inverse;
 mod model_args;
@@ -11,7 +12,9 @@ pub mod output;
 pub mod prefilter;
 pub mod run;
 mod scenario_args;
+pub mod send;
 
+pub use failure::Failure;
 pub use model_args::ModelArgs;
 pub use scenario_args::ScenarioArgs;
 
