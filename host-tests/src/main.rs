@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use host_tests::commands::{
-    compare, corner, demo, emulate, forward, inverse, prefilter, profile, run,
+    Failure, compare, corner, demo, emulate, forward, inverse, prefilter, profile, run, send,
 };
 
 /// Motion control that leaves the robot still: plans, runs and measures path programs.
@@ -25,6 +25,8 @@ enum Command {
     Run(run::RunArgs),
     /// Starts the emulated controller, for any sender to connect to.
     Emulate(emulate::EmulateArgs),
+    /// Sends a program to a controller, real or emulated, and shows what it does.
+    Send(send::SendArgs),
     /// Runs a program with every prefilter and shows the figures side by side.
     Compare(compare::CompareArgs),
     /// Solves one corner: how much two segments may overlap within a tolerance.
@@ -44,6 +46,7 @@ fn main() -> ExitCode {
         None => demo::execute(),
         Some(Command::Run(args)) => run::execute(&args),
         Some(Command::Emulate(args)) => emulate::execute(&args),
+        Some(Command::Send(args)) => return end(send::execute(&args)),
         Some(Command::Compare(args)) => compare::execute(&args),
         Some(Command::Corner(args)) => corner::execute(&args),
         Some(Command::Prefilter(args)) => prefilter::execute(&args),
@@ -51,19 +54,32 @@ fn main() -> ExitCode {
         Some(Command::Inverse(args)) => inverse::execute(&args),
         Some(Command::Forward(args)) => forward::execute(&args),
     };
+    end(done.map_err(Failure::from))
+}
+
+/// Says what there is to say; yields the exit status.
+fn end(done: Result<String, Failure>) -> ExitCode {
     match done {
+        Ok(answer) => say(&answer),
+        Err(failure) => {
+            say(&failure.answer);
+            eprintln!("stillpoint: {:#}", failure.error);
+            ExitCode::from(failure.status)
+        }
+    }
+}
+
+/// The answer goes to standard output, if there is one.
+fn say(answer: &str) -> ExitCode {
+    if answer.is_empty() {
+        return ExitCode::SUCCESS;
+    }
+    match writeln!(io::stdout(), "{answer}") {
         // A reader that has seen enough is no error.
-        Ok(text) if text.is_empty() => ExitCode::SUCCESS,
-        Ok(text) => match writeln!(io::stdout(), "{text}") {
-            Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-                eprintln!("stillpoint: the answer cannot be written ({error})");
-                ExitCode::FAILURE
-            }
-            _ => ExitCode::SUCCESS,
-        },
-        Err(error) => {
-            eprintln!("stillpoint: {error:#}");
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            eprintln!("stillpoint: the answer cannot be written ({error})");
             ExitCode::FAILURE
         }
+        _ => ExitCode::SUCCESS,
     }
 }

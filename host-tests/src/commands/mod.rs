@@ -4,6 +4,7 @@ pub mod compare;
 pub mod corner;
 pub mod demo;
 pub mod emulate;
+mod failure;
 pub mod forward;
 pub mod inverse;
 mod model_args;
@@ -12,7 +13,9 @@ pub mod prefilter;
 pub mod profile;
 pub mod run;
 mod scenario_args;
+pub mod send;
 
+pub use failure::Failure;
 pub use model_args::ModelArgs;
 pub use scenario_args::ScenarioArgs;
 
