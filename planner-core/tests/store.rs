@@ -96,7 +96,7 @@ impl NorFlash for Flash {
     }
 
     async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NoPower> {
-        assert!(offset as usize % WORD == 0 && bytes.len() % WORD == 0);
+        assert!((offset as usize).is_multiple_of(WORD) && bytes.len().is_multiple_of(WORD));
         for (i, word) in bytes.chunks(WORD).enumerate() {
             let whole = self.step()?;
             let at = offset as usize + i * WORD;

@@ -632,6 +632,7 @@ const REFUSALS: &[Row] = &[
     row("error:62", "", NONE, "G91 G0 X1", &["error:62"]),
     row("error:63", "", NONE, "N1 G21*0", &["error:63"]),
     row("error:64", "", NONE, "@many words", &["error:64"]),
+    row("error:65", "", THERE, "M100 P1 G0 X210", &["error:65"]),
     row(
         "error:66",
         "",

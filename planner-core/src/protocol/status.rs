@@ -277,11 +277,15 @@ mod tests {
     use std::format;
 
     fn status() -> Status {
-        let mut pose = Pose::default();
-        pose.x = LengthMm::from_num(254.0);
-        pose.y = LengthMm::from_num(-1.5);
-        let mut offset = Pose::default();
-        offset.x = LengthMm::from_num(127.0);
+        let pose = Pose {
+            x: LengthMm::from_num(254.0),
+            y: LengthMm::from_num(-1.5),
+            ..Pose::default()
+        };
+        let offset = Pose {
+            x: LengthMm::from_num(127.0),
+            ..Pose::default()
+        };
         Status {
             state: State::Run,
             pose,
