@@ -25,6 +25,7 @@ pub mod robot_file;
 pub mod scenario;
 pub mod sender;
 pub mod serial_loop;
+pub mod setpoint_watch;
 pub mod software_loop;
 pub mod summary;
 mod toml_place;

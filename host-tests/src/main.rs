@@ -5,7 +5,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use host_tests::commands::{
-    Failure, compare, corner, demo, emulate, forward, inverse, prefilter, profile, run, send,
+    Failure, compare, corner, demo, emulate, forward, inverse, monitor, prefilter, profile, run,
+    send,
 };
 
 /// Motion control that leaves the robot still: plans, runs and measures path programs.
@@ -27,6 +28,8 @@ enum Command {
     Emulate(emulate::EmulateArgs),
     /// Sends a program to a controller, real or emulated, and shows what it does.
     Send(send::SendArgs),
+    /// Shows what a controller does.
+    Monitor(monitor::MonitorArgs),
     /// Runs a program with every prefilter and shows the figures side by side.
     Compare(compare::CompareArgs),
     /// Solves one corner: how much two segments may overlap within a tolerance.
@@ -47,6 +50,7 @@ fn main() -> ExitCode {
         Some(Command::Run(args)) => run::execute(&args),
         Some(Command::Emulate(args)) => emulate::execute(&args),
         Some(Command::Send(args)) => return end(send::execute(&args)),
+        Some(Command::Monitor(args)) => return end(monitor::execute(&args)),
         Some(Command::Compare(args)) => compare::execute(&args),
         Some(Command::Corner(args)) => corner::execute(&args),
         Some(Command::Prefilter(args)) => prefilter::execute(&args),

@@ -24,7 +24,7 @@ const SIGNAL_SPREADS: Duration = Duration::from_millis(300);
 
 /// Arguments of `emulate`.
 #[derive(Args, Debug)]
-#[command(after_help = "\
+#[command(allow_negative_numbers = true, after_help = "\
 Any sender that speaks Grbl can connect to the pseudo-terminal, as to a serial port at any \
 speed, or to the TCP port; and several at once: all of them hear everything that the controller \
 says, and it hears all of them, byte by byte. Let one send lines; others may ask `?`, hold and \

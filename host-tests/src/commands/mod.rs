@@ -8,6 +8,7 @@ mod failure;
 pub mod forward;
 pub mod inverse;
 mod model_args;
+pub mod monitor;
 pub mod output;
 pub mod prefilter;
 pub mod profile;

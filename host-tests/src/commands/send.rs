@@ -35,7 +35,7 @@ mod status {
 
 /// Arguments of `send`.
 #[derive(Args, Debug)]
-#[command(after_help = "\
+#[command(allow_negative_numbers = true, after_help = "\
 While it runs, Ctrl-C holds the robot on its path and asks: r resumes, a aborts (soft reset), \
 q leaves it held and quits; a second Ctrl-C aborts. Without a terminal to ask at, Ctrl-C holds \
 and quits.
@@ -62,6 +62,9 @@ pub struct SendArgs {
     /// Reset the controller first: it forgets what it was doing.
     #[arg(long)]
     reset: bool,
+    /// Unlock the controller first, after an alarm and a look at the robot.
+    #[arg(long)]
+    unlock: bool,
     /// Number the lines, add checksums, and send again what the link has damaged.
     #[arg(long)]
     checksums: bool,
@@ -129,6 +132,9 @@ pub fn execute(args: &SendArgs) -> Result<String, Failure> {
     let interrupts = Interrupts::watch().map_err(|error| Failure::new(status::USAGE, error))?;
     let connection = Connection::open(&args.port, args.baud).map_err(link)?;
     let mut session = Session::begin(connection, args.reset).map_err(not_ready)?;
+    if args.unlock {
+        session.unlock().map_err(link)?;
+    }
     session.check_ready().map_err(not_ready)?;
     let start = Instant::now();
     let mut streamer = None;
@@ -349,6 +355,7 @@ impl Outcome<'_> {
         let reason = said.unwrap_or(codes::error(*code)).to_owned();
         let after = match accepted_after {
             0 => "nothing behind it was carried out".to_owned(),
+            1 => "a line that was already sent behind it was carried out".to_owned(),
             count => format!("{count} lines that were already sent behind it were carried out"),
         };
         let WireLine { number, text } = &self.program.lines[*index];

@@ -3,8 +3,8 @@
 //! A line has a number and a checksum. The controller takes a line only if it is whole and the
 //! next one; one that it already has gets its `ok` and no more. So a line may be sent again
 //! whenever in doubt, and only the controller knows for certain what it has: it is asked with a
-//! number that cannot be the next, refuses that, and says which it waits for. It has to say so
-//! twice, because its answers carry no checksum.
+//! number that cannot be the next, refuses that, and says which it waits for. Before the end it
+//! has to say so twice, because its answers carry no checksum.
 
 use std::collections::VecDeque;
 
@@ -261,7 +261,9 @@ impl CheckedStream {
         let Some(index) = awaited.and_then(index_of) else {
             return self.listen(again);
         };
-        if awaited != before {
+        // What ends a program has to be said twice; a mistake about the rest shows at once.
+        let may_end = index == self.lines.len() || self.suspicion.is_some();
+        if may_end && awaited != before {
             return self.clear(Step::Ask);
         }
         self.awaited_before = None;

@@ -47,12 +47,12 @@ pub fn error(code: u8) -> &'static str {
 #[must_use]
 pub fn alarm(code: u8) -> &'static str {
     match code {
-        1 => "a limit input tripped: free the axis, reset with --reset and home",
-        2 => "the target is beyond the travel: reset with --reset, unlock with $X",
-        3 => "it was reset while moving: the position is valid; unlock with $X",
+        1 => "a limit input tripped: free the arm, then send with --reset --unlock",
+        2 => "a target is out of reach: correct the program, then send with --reset --unlock",
+        3 => "it was reset while moving: the position is kept; send with --unlock",
         4 | 5 => "the probe did not find what it should",
         6..=9 => "homing failed: check the limit inputs, then home with $H",
-        _ => "see the controller's manual; unlock with $X when it is safe",
+        _ => "see the controller's manual, and send with --unlock when it is safe",
     }
 }
 

@@ -6,6 +6,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
+use serialport::SerialPort;
+
 use super::{Address, Reply};
 
 /// The reader looks this often whether anybody still listens to it.
@@ -61,22 +63,17 @@ impl Connection {
     /// # Errors
     /// [`LinkError::Unopened`].
     pub fn open(address: &Address, baud: u32) -> Result<Self, LinkError> {
-        let unopened =
-            |error: &dyn std::fmt::Display| LinkError::Unopened(address.clone(), error.to_string());
         match address {
             Address::Tcp(name) => {
-                let stream = connect(name).map_err(|error| unopened(&error))?;
-                let reader = stream.try_clone().map_err(|error| unopened(&error))?;
+                let stream = connect(name).map_err(|error| unopened(address, &error))?;
+                let reader = stream
+                    .try_clone()
+                    .map_err(|error| unopened(address, &error))?;
                 Ok(Self::new(address, stream, reader))
             }
             Address::Serial(path) => {
-                // A pseudo-terminal has no modem lines and takes any speed.
-                let port = serialport::new(path, baud).timeout(WRITE_TIMEOUT);
-                let port = port.open().map_err(|error| unopened(&error))?;
-                let mut reader = port.try_clone().map_err(|error| unopened(&error))?;
-                reader
-                    .set_timeout(READ_TIMEOUT)
-                    .map_err(|error| unopened(&error))?;
+                let [port, reader] =
+                    serial(path, baud).map_err(|error| unopened(address, &error))?;
                 Ok(Self::new(address, port, reader))
             }
         }
@@ -143,6 +140,35 @@ impl Connection {
     fn lost(&self, why: &str) -> LinkError {
         LinkError::Lost(self.address.clone(), why.to_owned())
     }
+}
+
+/// Opens a port only to read from it; a read that waits long times out.
+///
+/// # Errors
+/// [`LinkError::Unopened`].
+pub fn open_reader(address: &Address, baud: u32) -> Result<Box<dyn Read + Send>, LinkError> {
+    match address {
+        Address::Tcp(name) => match connect(name) {
+            Ok(stream) => Ok(Box::new(stream)),
+            Err(error) => Err(unopened(address, &error)),
+        },
+        Address::Serial(path) => match serial(path, baud) {
+            Ok([_, reader]) => Ok(Box::new(reader)),
+            Err(error) => Err(unopened(address, &error)),
+        },
+    }
+}
+
+fn unopened(address: &Address, error: &dyn std::fmt::Display) -> LinkError {
+    LinkError::Unopened(address.clone(), error.to_string())
+}
+
+/// A device's two directions. A pseudo-terminal has no modem lines and takes any speed.
+fn serial(path: &str, baud: u32) -> serialport::Result<[Box<dyn SerialPort>; 2]> {
+    let port = serialport::new(path, baud).timeout(WRITE_TIMEOUT).open()?;
+    let mut reader = port.try_clone()?;
+    reader.set_timeout(READ_TIMEOUT)?;
+    Ok([port, reader])
 }
 
 fn connect(name: &str) -> io::Result<TcpStream> {

@@ -8,6 +8,9 @@ use super::{State, StatusReport};
 /// outstanding, mean that it will not come. The first may have been under way already.
 const QUIET_REPORTS: u32 = 5;
 
+/// The same where an answer that comes all the same does no harm.
+const QUIET_REPORTS_IN_DOUBT: u32 = 2;
+
 /// Lines without an answer.
 #[derive(Clone, Debug)]
 pub struct Flight {
@@ -57,7 +60,8 @@ impl Flight {
     }
 
     /// Takes in a report; whether the answers that are outstanding will never come. A motion
-    /// may delay them, unless `motion_delays` says that none does.
+    /// may delay them, unless `motion_delays` says that none does and that a mistake costs
+    /// nothing but time.
     pub fn is_lost_by(&mut self, report: &StatusReport, motion_delays: bool) -> bool {
         !self.is_empty() && self.is_quiet_by(report, motion_delays)
     }
@@ -70,7 +74,12 @@ impl Flight {
             None => is_at_rest,
         };
         self.quiet_reports = if is_quiet { self.quiet_reports + 1 } else { 0 };
-        if self.quiet_reports < QUIET_REPORTS {
+        let enough = if motion_delays {
+            QUIET_REPORTS
+        } else {
+            QUIET_REPORTS_IN_DOUBT
+        };
+        if self.quiet_reports < enough {
             return false;
         }
         self.quiet_reports = 0;

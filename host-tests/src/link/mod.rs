@@ -23,7 +23,7 @@ mod streamer_tests;
 pub mod wire;
 
 pub use address::Address;
-pub use connection::{Connection, Heard, LinkError};
+pub use connection::{Connection, Heard, LinkError, open_reader};
 pub use known::Known;
 pub use reply::Reply;
 pub use status_report::{State, StatusReport};

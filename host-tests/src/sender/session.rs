@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use crate::link::{Connection, Heard, Known, LinkError, Reply, State, StatusReport, realtime};
 
 /// How often the status is asked for.
-pub const STATUS_PERIOD: Duration = Duration::from_millis(150);
+pub const STATUS_PERIOD: Duration = Duration::from_millis(100);
 
 /// A controller that does not answer `?` for so long is gone: it answers at once in any state.
 const SILENCE: Duration = Duration::from_secs(3);
@@ -27,7 +27,8 @@ pub enum SessionError {
     Link(#[from] LinkError),
     /// The controller is locked.
     #[error(
-        "the controller is in {0}: when it is safe, unlock with $X or home with $H, or reset with --reset"
+        "the controller is locked in the state {0}: when it is safe, send again with --unlock, \
+         after a limit alarm with --reset --unlock"
     )]
     Locked(String),
     /// It does something else.
@@ -86,6 +87,15 @@ impl Session {
             Some(State::Alarm(_)) => Err(SessionError::Locked(self.known.state_name())),
             _ => Err(SessionError::Busy(self.known.state_name())),
         }
+    }
+
+    /// Unlocks the controller after an alarm.
+    ///
+    /// # Errors
+    /// The link is lost.
+    pub fn unlock(&mut self) -> Result<(), LinkError> {
+        self.ask("$X")?;
+        self.await_report()
     }
 
     /// Sends bytes as they are.

@@ -2,5 +2,6 @@
 
 mod firmware;
 mod instructions;
+mod link;
 mod same_bits;
 mod support;

@@ -1,0 +1,9 @@
+//! The command link from outside: `stillpoint emulate`, `send` and `monitor` together, over a
+//! pseudo-terminal and over TCP.
+
+mod emulate;
+mod intervene;
+mod monitor;
+mod noise;
+mod send;
+mod support;
