@@ -3,11 +3,10 @@
 use host_tests::software_loop::Controller;
 use planner_core::config::Robot;
 use planner_core::motion::{DelayLines, MotionState, Order, Setpoint};
-use planner_core::planner::Cause;
 use planner_core::prefilter::{Kind, PrefilterConfig};
 use planner_core::queue::{KERNELS, SegmentQueue};
 
-use crate::support::{CORNER_PATH, is_at_rest, robot};
+use crate::support::{CORNER_PATH, is_at_rest, prefilter_line, robot};
 
 /// Plans with `plan`, then runs what is queued to its end; a pause is not resumed.
 fn run(robot: &Robot, plan: impl FnOnce(&mut Controller<'_>)) -> Vec<Setpoint> {
@@ -39,19 +38,10 @@ fn outputs_switch_when_the_motion_has_settled_at_their_point() {
         let robot = robot(|config| config.prefilter.kind = kind);
         let all = run(&robot, |controller| {
             feed(controller, "G0 X200 Y0\nG1 X210 F6000");
-            controller
-                .planner()
-                .switch_outputs(1)
-                .expect("there is room");
+            feed(controller, "M3");
             feed(controller, "G3 X210 Y20 J10");
-            controller
-                .planner()
-                .switch_outputs(3)
-                .expect("there is room");
-            controller
-                .planner()
-                .switch_outputs(2)
-                .expect("there is room");
+            feed(controller, "M8");
+            feed(controller, "M5");
             feed(controller, "G1 X200");
         });
         let changes: Vec<usize> = (1..all.len())
@@ -97,10 +87,7 @@ impl IntoFixed for i32 {
 fn outputs_switch_without_any_motion() {
     let all = run(&robot(|_| {}), |controller| {
         feed(controller, "G0 X200 Y0");
-        controller
-            .planner()
-            .switch_outputs(1)
-            .expect("there is room");
+        feed(controller, "M3");
     });
     assert_eq!(all.iter().map(|s| s.outputs).collect::<Vec<_>>(), [1]);
 }
@@ -112,10 +99,7 @@ fn a_pause_waits_for_resume_and_outputs_behind_it_wait_too() {
     let mut filters = Box::new(DelayLines::new());
     let mut controller = Controller::new(&robot, &mut queue, &mut filters);
     feed(&mut controller, "G0 X200 Y0\nG1 X210 F6000\nM0");
-    controller
-        .planner()
-        .switch_outputs(1)
-        .expect("there is room");
+    feed(&mut controller, "M3");
     feed(&mut controller, "G1 X220");
     controller.obey(Order::Start);
     let paused = loop {
@@ -150,10 +134,7 @@ fn a_hold_on_the_way_to_an_action_holds_it_back() {
     let mut filters = Box::new(DelayLines::new());
     let mut controller = Controller::new(&robot, &mut queue, &mut filters);
     feed(&mut controller, "G0 X200 Y0\nG1 X210 F6000");
-    controller
-        .planner()
-        .switch_outputs(1)
-        .expect("there is room");
+    feed(&mut controller, "M3");
     controller.obey(Order::Start);
     // The raw path has arrived, the filter has not settled.
     for _ in 0..200 {
@@ -181,10 +162,7 @@ fn the_prefilter_changes_where_the_program_says() {
     let onward = "G1 X200 Y30 F9600\nG2 X180 Y10 I-20 J0\nM2";
     let changed = run(&first, |controller| {
         feed(controller, CORNER_PATH);
-        controller
-            .planner()
-            .change_prefilter(&other)
-            .expect("there is room");
+        feed(controller, &prefilter_line(&other));
         feed(controller, onward);
     });
     let before = run(&first, |controller| feed(controller, CORNER_PATH));
@@ -208,23 +186,17 @@ fn a_prefilter_that_is_refused_or_finds_no_room_changes_nothing() {
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
     let mut controller = Controller::new(&robot, &mut queue, &mut filters);
-    let mut config = PrefilterConfig::default();
-    config.frequency_hz = -1.0;
-    let refused = controller.planner().change_prefilter(&config);
-    assert!(matches!(refused, Err(Cause::Prefilter(_))));
-    config.frequency_hz = 5.0;
+    let code = |controller: &mut Controller<'_>, line: &str| {
+        let planned = controller.planner().line(line.as_bytes());
+        planned.map_or_else(|error| error.code(), |_| 0)
+    };
+    assert_eq!(code(&mut controller, "M100 Q0"), 76);
     for _ in 0..KERNELS {
         assert!(controller.planner().has_room());
-        controller
-            .planner()
-            .change_prefilter(&config)
-            .expect("there is room");
+        assert_eq!(code(&mut controller, "M100 Q5"), 0);
     }
     assert!(!controller.planner().has_room());
-    assert_eq!(
-        controller.planner().change_prefilter(&config),
-        Err(Cause::Full)
-    );
+    assert_eq!(code(&mut controller, "M100 Q6"), 74);
     controller.obey(Order::Start);
     while controller.tick().state != MotionState::Idle {}
     assert!(controller.planner().has_room());

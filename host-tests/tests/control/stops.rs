@@ -12,7 +12,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::support::{
-    CORNER_PATH, Orders, TICK_S, allowance_mm, is_at_rest, report, robot, setpoints, velocities,
+    CORNER_PATH, Orders, TICK_S, allowance_mm, is_at_rest, prefilter_line, report, robot,
+    setpoints, velocities,
 };
 
 /// From wherever the corner path was left to a place off it.
@@ -156,9 +157,8 @@ fn a_forgotten_change_of_the_prefilter_is_made_all_the_same() {
         .feed(&mut "G0 X200 Y0\nG1 X250 F6000".lines())
         .expect("it is right");
     controller
-        .planner()
-        .change_prefilter(&other)
-        .expect("there is room");
+        .feed(&mut prefilter_line(&other).lines())
+        .expect("it is right");
     controller.obey(Order::Start);
     for _ in 0..100 {
         let _ = controller.tick();

@@ -8,7 +8,7 @@ use host_tests::software_loop::Controller;
 use host_tests::vector::{norm, scale, sub, xyz};
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::motion::{DelayLines, Order, Setpoint};
-use planner_core::prefilter::Kind;
+use planner_core::prefilter::{Kind, PrefilterConfig};
 use planner_core::queue::SegmentQueue;
 
 pub const CORNER_PATH: &str = include_str!("../../programs/corner-path.gcode");
@@ -108,4 +108,21 @@ pub fn top_speed_mm_s(setpoints: &[Setpoint]) -> f64 {
         .into_iter()
         .map(norm)
         .fold(0.0, f64::max)
+}
+
+/// The line that changes the prefilter to this one.
+pub fn prefilter_line(config: &PrefilterConfig) -> String {
+    let place = Kind::ALL.iter().position(|kind| *kind == config.kind);
+    format!(
+        "M100 P{} Q{} R{}",
+        place.expect("every kind is listed"),
+        config.frequency_hz,
+        config.damping
+    )
+}
+
+/// Whether a setpoint says that nothing moves.
+pub fn is_at_rest(setpoint: &Setpoint) -> bool {
+    let joints = &setpoint.joints;
+    joints.velocity == [0.0; 4] && joints.acceleration == [0.0; 4]
 }
