@@ -24,12 +24,15 @@ const SIGNAL_SPREADS: Duration = Duration::from_millis(300);
 
 /// Arguments of `emulate`.
 #[derive(Args, Debug)]
-#[command(allow_negative_numbers = true, after_help = "\
+#[command(
+    allow_negative_numbers = true,
+    after_help = "\
 Any sender that speaks Grbl can connect to the pseudo-terminal, as to a serial port at any \
 speed, or to the TCP port; and several at once: all of them hear everything that the controller \
 says, and it hears all of them, byte by byte. Let one send lines; others may ask `?`, hold and \
 resume. It listens on 127.0.0.1 only, and says nothing before it is asked: byte 0x18 (Ctrl-X) \
-brings the banner.")]
+brings the banner."
+)]
 pub struct EmulateArgs {
     /// TCP port for senders; 0 chooses a free one.
     #[arg(long, value_name = "PORT", default_value_t = 0)]

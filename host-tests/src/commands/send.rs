@@ -35,7 +35,9 @@ mod status {
 
 /// Arguments of `send`.
 #[derive(Args, Debug)]
-#[command(allow_negative_numbers = true, after_help = "\
+#[command(
+    allow_negative_numbers = true,
+    after_help = "\
 While it runs, Ctrl-C holds the robot on its path and asks: r resumes, a aborts (soft reset), \
 q leaves it held and quits; a second Ctrl-C aborts. Without a terminal to ask at, Ctrl-C holds \
 and quits.
@@ -47,7 +49,8 @@ Exit status:
   3  an alarm, or the controller was not ready for a program
   4  aborted at the keyboard
   5  the link could not be opened, was lost or silent, or the controller restarted
-  6  held by Ctrl-C and left so")]
+  6  held by Ctrl-C and left so"
+)]
 pub struct SendArgs {
     /// Serial device, pseudo-terminal, or tcp:HOST:PORT.
     port: Address,

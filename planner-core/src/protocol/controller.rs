@@ -844,6 +844,14 @@ impl Controller<'_> {
     /// one that has come before.
     fn in_sequence(&mut self, line: &Line) -> Result<bool, Refusal> {
         let number = line.number().filter(|_| line.has_checksum());
+        // Without a number M110 ends the count. Only with a checksum: damage must not.
+        let ends_it = line.sets_number() && line.has_checksum() && line.number().is_none();
+        // After a reset another sender may go on, one that never numbers its lines. A numbered
+        // line that was damaged still has its N.
+        let begins_plainly = self.sequence == Sequence::Lost && line.number().is_none();
+        if ends_it || begins_plainly {
+            self.sequence = Sequence::Off;
+        }
         match (self.sequence, number) {
             (Sequence::Off, None) => return Ok(true),
             // A line without checksum among lines with one has lost it.
