@@ -279,7 +279,7 @@ impl<'q> Motion<'q> {
             self.stood_for.saturating_add(1)
         };
         // the filters and then the two ticks of history have settled
-        if self.stood_for > self.kernel.length_ticks() + 1 {
+        if self.stood_for > self.kernel.delay_ticks() + 1 {
             self.come_to_rest();
             return self.history[1];
         }

@@ -50,8 +50,6 @@ pub struct RawSegment {
     pub bow: Option<Bow>,
     /// The highest rate at which it may be walked, from [`Rate::ONE`] on.
     pub top_rate: Rate,
-    /// Whether no other corner is still being rounded when it begins.
-    pub begins_alone: bool,
     /// What sets its rate.
     pub pace: Pace,
 }
@@ -86,7 +84,6 @@ impl RawSegment {
                 Shape::Arc(arc) => Some(Bow::new(&arc)),
             },
             top_rate: Rate::ONE,
-            begins_alone: true,
             pace: Pace::Feed,
         }
     }

@@ -55,14 +55,6 @@ pub struct Timing {
     pub pace: Pace,
 }
 
-/// How a segment follows the one before.
-struct Joint {
-    /// How long it begins before the other's deceleration ends; 0 is an exact stop.
-    overlap: TickTime,
-    /// Whether no other corner is being rounded then.
-    alone: bool,
-}
-
 /// Times segments and hands them to the tick.
 pub struct Schedule<'q> {
     queue: SegmentProducer<'q>,
@@ -129,27 +121,23 @@ impl<'q> Schedule<'q> {
         if self.free_places() == 0 {
             return false;
         }
-        let joint = match self.previous {
-            None => Joint {
-                overlap: 0,
-                alone: true,
-            },
+        let overlap = match self.previous {
+            None => 0,
             Some(arriving) => self.corner(robot, &arriving, &side(first_tangent), tolerance_mm),
         };
         self.previous = Some(side(last_tangent));
         let segment = RawSegment {
-            overlap: joint.overlap,
-            begins_alone: joint.alone,
+            overlap,
             pace: timing.pace,
             ..RawSegment::new(path, duration_s)
         };
-        let passed = robot.kernel.length() - joint.overlap + segment.duration;
+        let passed = robot.kernel.length() - overlap + segment.duration;
         for blend in &mut self.blends {
             blend.ends -= passed;
         }
         // A segment may be hurried if the corner before it is done at its end.
-        let stands_alone = passed >= robot.kernel.settling_time();
-        let top_rate = if stands_alone && segment.duration >= SHORTEST_HURRIED {
+        let is_done = passed >= robot.kernel.settling_time();
+        let top_rate = if is_done && segment.duration >= SHORTEST_HURRIED {
             Rate::at_least_one(duration_s / timing.shortest_s)
         } else {
             Rate::ONE
@@ -204,14 +192,14 @@ impl<'q> Schedule<'q> {
         queued
     }
 
-    /// How a segment follows the one before at a corner.
+    /// How long a segment begins before the one before has come to a stop; 0 is an exact stop.
     fn corner(
         &mut self,
         robot: &Robot,
         arriving: &Side,
         leaving: &Side,
         tolerance_mm: f32,
-    ) -> Joint {
+    ) -> TickTime {
         let turns_only = arriving.feed_mm_s == 0.0 || leaving.feed_mm_s == 0.0;
         let usable_mm = if turns_only { 0.0 } else { tolerance_mm };
         let corner = solve_sampled(robot, arriving, leaving, usable_mm);
@@ -237,15 +225,11 @@ impl<'q> Schedule<'q> {
             dwell = dwell.max(oldest.ends);
             self.blends.pop_front();
         }
-        let alone = self.blends.is_empty();
         if dwell < settled {
             // there is room: a full deque has given up its oldest
             let _ = self.blends.push_back(own);
         }
-        Joint {
-            overlap: (settled - dwell).max(0),
-            alone,
-        }
+        (settled - dwell).max(0)
     }
 
     /// Whether a further corner and those being rounded keep the smallest tolerance.

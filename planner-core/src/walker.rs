@@ -55,10 +55,8 @@ enum Walk {
 struct Stand {
     /// For so long.
     time: TickTime,
-    /// For at least so long, until the corner behind that segment is done.
-    least: TickTime,
-    /// The highest rate at which that segment was walked, at least 1.
-    fastest: Rate,
+    /// The licence of that segment.
+    licence: Rate,
 }
 
 impl Stand {
@@ -66,8 +64,7 @@ impl Stand {
     /// last at the lowest rate can be added.
     const AT_REST: Self = Self {
         time: 1 << 60,
-        least: 0,
-        fastest: Rate::ONE,
+        licence: Rate::ONE,
     };
 
     /// The way along the next segment, if its dwell ends within what is `left` of the tick.
@@ -78,11 +75,7 @@ impl Stand {
         wanted: Rate,
         left: TickTime,
     ) -> Option<Way> {
-        let licence = if wanted > Rate::ONE && next.begins_alone {
-            wanted.min(next.top_rate)
-        } else {
-            Rate::ONE
-        };
+        let licence = wanted.min(next.top_rate).max(Rate::ONE);
         let dwell = self.dwell(kernel, next.overlap, licence, left);
         let wait = dwell.wrapping_sub(self.time).max(0);
         if wait >= left {
@@ -101,19 +94,18 @@ impl Stand {
     /// How long to stand before a segment that is walked at up to `licence`, when `left` of the
     /// tick is left.
     fn dwell(&self, kernel: &Kernel, overlap: TickTime, licence: Rate, left: TickTime) -> TickTime {
-        let fastest = self.fastest.max(licence);
+        let fastest = self.licence.max(licence);
         let overlap = if fastest > Rate::ONE {
             fastest.real(overlap) - ONE_TICK
         } else {
             overlap
         };
-        let dwell = if overlap > 0 {
+        if overlap > 0 {
             kernel.length() - overlap
         } else {
             let since_arrival = self.time.wrapping_add(left);
             kernel.stop_time(since_arrival & (ONE_TICK - 1))
-        };
-        dwell.max(self.least)
+        }
     }
 }
 
@@ -125,7 +117,7 @@ struct Way {
     remaining: TickTime,
     /// Real time since the raw point arrived at the corner before the segment.
     since_corner: TickTime,
-    /// The highest rate that the corner before the segment allows for, at least 1.
+    /// The highest rate that the corners on both sides allow for, at least 1.
     licence: Rate,
 }
 
@@ -163,30 +155,34 @@ struct Gone {
 /// least one tick, so that a tick sees one end and one beginning at the most.
 ///
 /// # Rates
-/// Raw time passes at a rate that may change with every tick: 0 in a hold, from 0.1 to 2 by an
+/// Raw time passes at a rate that may change with every tick: 0 in a hold, 0.1 to 2 by an
 /// override. Dwells pass in real time. The prefilter follows as it follows every raw path, and
 /// the corners keep their tolerance:
 ///
 /// **Up to 1.** With `a` the mean distance of the raw point before a corner and `b` that behind
 /// it, over the filter's window, the command is at `P_c − a u₁ + b u₂`. A lower rate and a
-/// longer dwell leave both `a` and `b` at most what they would have been at the same time
-/// after the arrival. `a` falls and `b` grows, so in the plane of `a` and `b` the curve runs
-/// below the planned one: on each ray from the corner it is nearer, and so are the closest
-/// approach and every distance from the path, which are proportional along a ray. Where
-/// several corners are being rounded, the schedule adds up the least of `a` and `b` of each,
-/// and those do not grow either; corners are done after the same time as planned.
+/// longer dwell leave both at most what was planned for the same time after the arrival. `a`
+/// falls and `b` grows, so in the plane of `a` and `b` the curve runs below the planned one: on
+/// each ray from the corner it is nearer, and with it, in proportion, the closest approach and
+/// every distance from the path. Where several corners are being rounded, the schedule adds up
+/// the lesser of `a` and `b` of each, which does not grow either, and no corner begins earlier
+/// after another one than planned.
 ///
 /// **At k above 1** the feedrates grow by `k`, and the overlap shrinks to `t_c / k`. The ramp
-/// response `I` is convex and `I(0) = 0`, so `k F I(x / k) ≤ F I(x)`: again the curve runs below
+/// response `I` is convex and `I(0) = 0`, so `k F I(x / k) ≤ F I(x)`: the curve again runs below
 /// the planned one. A tick is taken off the overlap besides, because the margin for what the
-/// trace does within a tick grows with `k`. Segments then end sooner than the plan relied on,
-/// so this needs corners that are rounded alone:
-/// - a segment's `top_rate` is above 1 only if, at 1, the corner before it is done when the
-///   raw point arrives at the one behind it;
-/// - whatever its rate, the raw point waits there until that is so;
-/// - a segment that begins while other corners are being rounded is walked at up to 1 until
-///   they are done; the raw point has then fallen so far behind, standing for `T − t_c / k`,
-///   that no mean distance is larger than planned.
+/// trace does within a tick grows with `k`. Only segments whose first corner is planned to be
+/// done at their end are hurried, `D ≥ t_c`; then that corner really is done when the next one
+/// begins, since `(T − t_c/k) + D/k + (T − t_c'/k) ≥ T`. Where corners share the tolerance, the
+/// raw point is slow enough as well:
+/// - after the arrival at a corner, a hurried segment behind it brings the raw point to where
+///   the plan has it only when the corner is done: until then `b` is at most as planned;
+/// - before the arrival, a hurried segment further back counts no more than planned in `a`,
+///   because the dwell between, `T − t_c/k`, takes more time than was gained.
+///
+/// So a corner has to be left, after it was arrived at, by the highest rate on either side:
+/// the **licence** of a segment. It is settled when the segment begins, and can rise only when
+/// the corner before it is done.
 pub struct Walker<'q> {
     queue: SegmentConsumer<'q>,
     walk: Walk,
@@ -323,15 +319,9 @@ impl<'q> Walker<'q> {
         let left = rate.real(share - way.remaining);
         self.point = segment.target;
         self.walk = Walk::Standing(if moved {
-            let since_corner = way.since_corner.wrapping_add(ONE_TICK - left);
             Stand {
                 time: 0,
-                least: if segment.top_rate > Rate::ONE {
-                    kernel.settling_time() - since_corner
-                } else {
-                    0
-                },
-                fastest: way.licence,
+                licence: way.licence,
             }
         } else {
             Stand::AT_REST

@@ -59,7 +59,7 @@ fn hold_at_instants(kind: Kind, instants: usize) {
         assert_eq!(held.last(), undisturbed.last(), "{context}");
         assert!(held.len() <= undisturbed.len() + resumed_at - held_at + 1);
 
-        // What has been held for long enough, and was not yet at the end of the path.
+        // what has been held for long enough, and was not yet at the end of the path.
         if resumed_at - held_at > length + 5 && held_at + length < undisturbed.len() {
             let (ticks, mm) = stop_of(&held, held_at);
             stop_ticks = stop_ticks.max(ticks);
@@ -191,8 +191,8 @@ fn a_line_is_left_by_the_mean_delay() {
             .iter()
             .position(|setpoint| setpoint.state == MotionState::Held)
             .expect("it comes to rest");
-        let length = usize::from(robot.kernel.length_ticks());
-        assert_eq!(held, 800 + length + 1, "{kind:?}");
+        let delay = usize::from(robot.kernel.delay_ticks());
+        assert_eq!(held, 800 + delay + 1, "{kind:?}");
         // The setpoint is a tick behind the newest command, which the hold leaves as it is.
         let y_mm = |tick: usize| all[tick].pose.y.to_num::<f64>();
         let way_mm = y_mm(held) - y_mm(800);

@@ -1,5 +1,7 @@
 //! Random programs under random control.
 
+use std::fmt::Write;
+
 use host_tests::random_program::{Shape, random_program};
 use planner_core::config::Robot;
 use planner_core::motion::Order;
@@ -61,6 +63,93 @@ fn keep_their_promises(seeds: std::ops::Range<u64>) {
             context()
         );
     }
+}
+
+/// Moves that last about as long as the prefilter: whether a corner is done when the next one
+/// comes is a matter of the override.
+#[test]
+fn corners_a_filter_apart_keep_the_tolerance_when_hurried() {
+    corners_a_filter_apart(0..3000);
+}
+
+#[test]
+#[ignore = "long: forty thousand programs"]
+fn many_corners_a_filter_apart_keep_the_tolerance_when_hurried() {
+    corners_a_filter_apart(3000..43_000);
+}
+
+/// Corners closer together than three times the tolerance share it: there the distance from the
+/// path is what is promised.
+fn corners_a_filter_apart(seeds: std::ops::Range<u64>) {
+    const FEED_MM_S: f64 = 160.0;
+    for seed in seeds {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let kind = Kind::ALL[1 + seed as usize % (Kind::ALL.len() - 1)];
+        let mut robot = robot(|config| {
+            config.prefilter.kind = kind;
+            config.prefilter.frequency_hz = 12.0;
+        });
+        // what the tool travels while the prefilter settles
+        let reach_mm = FEED_MM_S * robot.prefilter.length_s();
+        robot.config.corner_tolerance_mm = (reach_mm * rng.random_range(0.01..0.2)) as f32;
+        let program = staircase(&mut rng, reach_mm);
+        let mut orders = Orders::new();
+        let mut tick = 0;
+        for _ in 0..60 {
+            let percent = if rng.random_bool(0.3) {
+                100
+            } else {
+                rng.random_range(100..=200)
+            };
+            orders.insert(
+                tick,
+                Order::Rates {
+                    feed_percent: percent,
+                    rapid_percent: 100,
+                },
+            );
+            tick += rng.random_range(1..300);
+        }
+        let all = setpoints(&robot, &program, &orders);
+        let tolerance_mm = f64::from(robot.config.corner_tolerance_mm);
+        let allowance_mm = allowance_mm(kind, 2.0 * FEED_MM_S);
+        let report = report(&robot, &program, &all);
+        assert!(
+            report.max_path_deviation_mm <= tolerance_mm + allowance_mm,
+            "seed {seed}, {kind:?}: {} of {tolerance_mm} mm\n{program}{orders:?}",
+            report.max_path_deviation_mm
+        );
+        for corner in &report.corners {
+            assert!(
+                corner.shorter_side_mm < 3.0 * tolerance_mm
+                    || corner.error_mm <= tolerance_mm + allowance_mm,
+                "seed {seed}, {kind:?}: {corner:?}\n{program}{orders:?}"
+            );
+        }
+    }
+}
+
+/// Moves of 0.2 to 2 times `reach_mm` that turn by up to 140° either way.
+fn staircase(rng: &mut ChaCha8Rng, reach_mm: f64) -> String {
+    let mut program = String::from("G0 X230 Y0\nG1 F9600\n");
+    let (mut at, mut heading) = ([230.0_f64, 0.0_f64], 0.0_f64);
+    for _ in 0..25 {
+        let length_mm = reach_mm * rng.random_range(0.2_f64.ln()..2.0_f64.ln()).exp();
+        let turn = rng.random_range(20.0_f64..140.0).to_radians();
+        heading += if rng.random_bool(0.7) { turn } else { -turn };
+        // back towards the middle of the reach
+        while (at[0] + length_mm * heading.cos() - 230.0).hypot(at[1] + length_mm * heading.sin())
+            > 75.0
+        {
+            heading += 0.7;
+        }
+        at = [
+            at[0] + length_mm * heading.cos(),
+            at[1] + length_mm * heading.sin(),
+        ];
+        let _ = writeln!(program, "X{:.4} Y{:.4}", at[0], at[1]);
+    }
+    program + "M2\n"
 }
 
 fn scenario(seed: u64) -> (Robot, String) {

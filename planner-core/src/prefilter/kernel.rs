@@ -154,6 +154,13 @@ impl Kernel {
         ONE_TICK * (TickTime::from(self.length_ticks) + 2)
     }
 
+    /// Ticks by which the oldest input of the output is behind: an input that has been constant
+    /// for longer *is* the output.
+    #[must_use]
+    pub fn delay_ticks(&self) -> u16 {
+        self.delay_ticks
+    }
+
     /// Ticks after which a constant input has reached the output everywhere.
     #[must_use]
     pub fn length_ticks(&self) -> u16 {
