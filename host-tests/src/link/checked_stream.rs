@@ -34,6 +34,8 @@ enum Phase {
     /// An answer was not what it should be, so maybe one more or one less than lines is on its
     /// way: they are let pass until none comes any more. Then [`Phase::Clearing`].
     Listening(Step),
+    /// The controller is told that no more numbered lines come, so that any sender may follow.
+    Dismissing(Ending),
     /// A line end, for a line that lost its own, and `$ACK` are under way; then the step.
     Clearing(Step),
     /// The controller is told to count from the beginning. Then it is asked whether it does.
@@ -230,7 +232,11 @@ impl CheckedStream {
                 self.phase = Phase::Streaming;
                 self.next = self.accepted;
             }
-            Phase::Clearing(Step::End(ending)) => self.phase = Phase::Over(ending),
+            Phase::Clearing(Step::End(ending)) => {
+                self.say(Phase::Dismissing(ending), wire::with_checksum("M110"));
+            }
+            // Whatever it answers: the program has ended.
+            Phase::Dismissing(ending) => self.phase = Phase::Over(ending),
             Phase::Numbering if error.is_none() => self.ask(),
             Phase::Numbering => self.listen(Step::Number),
             Phase::Asking => self.told(awaited),

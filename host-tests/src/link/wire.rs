@@ -109,7 +109,12 @@ pub fn checked(text: &str, number: u32) -> String {
     let bare = after_n.map_or(text, |rest| {
         rest.trim_start_matches(|c: char| c.is_ascii_digit())
     });
-    let line = format!("N{number}{bare}");
+    with_checksum(&format!("N{number}{bare}"))
+}
+
+/// A line with its checksum.
+#[must_use]
+pub fn with_checksum(line: &str) -> String {
     let checksum = CRC.checksum(line.as_bytes());
     format!("{line}*{checksum:05}")
 }

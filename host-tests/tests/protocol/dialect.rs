@@ -280,6 +280,13 @@ const COMMANDS: &[Row] = &[
         "N1 G21*27",
         &["ok"],
     ),
+    row(
+        "M110",
+        "sets the line number, without one ends the count",
+        &["N1 G21*27", "M110*125"],
+        "G21",
+        &["ok"],
+    ),
     row("empty line", "is answered", NONE, "", &["ok"]),
     row(
         "( ) and ;",

@@ -339,3 +339,28 @@ fn any_storm_of_realtime_bytes_ends_in_a_known_state() {
         assert_eq!(x_mm(desk), 210.0);
     });
 }
+
+/// After a sender that numbers its lines comes one that does not.
+#[test]
+fn a_count_of_lines_is_ended_by_m110_or_left_behind_by_a_reset() {
+    use host_tests::link::wire::checked;
+    with_robot(|desk| {
+        desk.ask(&checked("G21", 7));
+        assert!(desk.ask("G21").contains("error:67"), "it may be damaged");
+        assert!(desk.ask("M110").contains("error:67"), "likewise");
+        assert!(desk.ask(&checked("", 9)).contains("Next is N8"));
+        assert!(desk.ask("M110*125").contains("ok"));
+        assert!(desk.ask("G21").contains("ok"));
+
+        desk.ask(&checked("G21", 7));
+        desk.run_ms(100);
+        desk.send(b"\x18");
+        desk.run_ms(10);
+        desk.heard();
+        let said = desk.ask(&checked("G21", 8));
+        assert!(said.contains("error:67"), "{said}");
+        assert!(desk.ask("N8 G21").contains("error:67"), "it may be damaged");
+        assert!(desk.ask("G21").contains("ok"));
+        assert!(desk.ask("N8 G21").contains("ok"));
+    });
+}

@@ -65,7 +65,7 @@ fn every_change_is_a_line() {
     assert!(seen.iter().any(|line| line["state"] == "Run"));
     let mut messages = seen.iter().filter_map(|line| line["message"].as_str());
     assert!(
-        messages.any(|said| said.contains("2000.000 mm from the shoulder")),
+        messages.any(|said| said.contains("of stretched or folded")),
         "{seen:?}"
     );
     signal(&monitor, Signal::INT);

@@ -57,7 +57,7 @@ fn every_line_is_carried_out_once() {
     };
     let here = TempDir::new().unwrap();
     let file = here.path().join("relative.gcode");
-    let moves = "G1 X0.07 Y-0.02 F6000\nG1 X-0.03 Y0.04\n".repeat(250);
+    let moves = "G1 X0.07 Y-0.02 F6000\n".repeat(500);
     fs::write(&file, format!("G0 X250 Y0\nG91\n{moves}G90\nM2\n")).unwrap();
     let port = format!("tcp:127.0.0.1:{}", noisy(emulator.tcp, 10));
     let args = [
@@ -81,5 +81,8 @@ fn every_line_is_carried_out_once() {
     );
     assert!(summary["resent"].as_u64().unwrap() > 0);
     let position = emulator.client().await_status("<Idle");
-    assert!(position.contains("MPos:260.000,5.000,0.000"), "{position}");
+    assert!(
+        position.contains("MPos:285.000,-10.000,0.000"),
+        "{position}"
+    );
 }
