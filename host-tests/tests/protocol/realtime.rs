@@ -364,3 +364,23 @@ fn a_count_of_lines_is_ended_by_m110_or_left_behind_by_a_reset() {
         assert!(desk.ask("N8 G21").contains("ok"));
     });
 }
+
+/// Senders begin with a reset; the program's first point still says where the tool is.
+#[test]
+fn a_reset_does_not_make_the_position_known() {
+    with_controller(Records::new(), |desk| {
+        desk.run_ms(2);
+        desk.send(b"\x18");
+        desk.run_ms(10);
+        desk.heard();
+        assert!(desk.ask("G0 X200 Y10").contains("ok"));
+        desk.run_ms(10);
+        assert_eq!(desk.state(), "Idle");
+        assert_eq!(x_mm(desk), 200.0);
+        desk.send(b"\x18");
+        desk.run_ms(10);
+        desk.heard();
+        assert!(desk.ask("G0 X210").contains("ok"));
+        assert_eq!(desk.state(), "Run", "now it is known, and moves");
+    });
+}

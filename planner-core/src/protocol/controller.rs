@@ -617,7 +617,10 @@ impl Controller<'_> {
 
     /// The motion that was stopped for good stands.
     fn stopped(&mut self, after: AfterStop, pose: Pose) {
-        self.planner.stopped_at(pose);
+        // Who did not know where the robot is does not know it now.
+        if self.target().is_some() {
+            self.planner.stopped_at(pose);
+        }
         match after {
             AfterStop::Reset { in_motion } => {
                 self.planner.reset_modes();
