@@ -191,12 +191,12 @@ fn a_prefilter_that_is_refused_or_finds_no_room_changes_nothing() {
         planned.map_or_else(|error| error.code(), |_| 0)
     };
     assert_eq!(code(&mut controller, "M100 Q0"), 76);
-    for _ in 0..KERNELS {
+    for change in 0..KERNELS {
         assert!(controller.planner().has_room());
-        assert_eq!(code(&mut controller, "M100 Q5"), 0);
+        assert_eq!(code(&mut controller, &format!("M100 Q{}", 5 + change)), 0);
     }
     assert!(!controller.planner().has_room());
-    assert_eq!(code(&mut controller, "M100 Q6"), 74);
+    assert_eq!(code(&mut controller, "M100 Q20"), 74);
     controller.obey(Order::Start);
     while controller.tick().state != MotionState::Idle {}
     assert!(controller.planner().has_room());
