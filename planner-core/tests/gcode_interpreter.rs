@@ -541,7 +541,7 @@ fn an_end_takes_back_what_grbls_does() {
 }
 
 #[test]
-fn a_reset_keeps_position_and_stored_offsets() {
+fn a_reset_keeps_position_outputs_and_stored_offsets() {
     let mut interpreter = after(&[
         "G0 X10 Y20",
         "G10 L2 P1 X5",
@@ -553,7 +553,9 @@ fn a_reset_keeps_position_and_stored_offsets() {
     ]);
     let stored = interpreter.offsets().to_bytes();
     interpreter.reset();
-    let mut fresh = Interpreter::new(DEFAULTS);
+    // A gripper must not open because a sender was reset.
+    let mut fresh = after(&["M3"]);
+    fresh.reset();
     fresh.set_position(Some(pose(10.0, 20.0, 0.0, 0.0)));
     assert_eq!(interpreter.modal(), fresh.modal());
     assert_eq!(interpreter.offsets().to_bytes(), stored);
