@@ -4,7 +4,7 @@
 
 use embassy_executor::Executor;
 use firmware::board::{
-    self, Board, BoardFlash, BoardOutputs, BoardWatchdog, CommandIn, CommandOut, Counter,
+    self, Board, BoardArm, BoardFlash, BoardOutputs, BoardWatchdog, CommandIn, CommandOut, Counter,
     SetpointOut, StackUse, Stopwatch, stack_use,
 };
 use firmware::tasks::command::Commands;
@@ -45,6 +45,7 @@ fn start() -> Commands<CommandIn, CommandOut, BoardFlash> {
         command_out,
         setpoint_out,
         outputs,
+        arm,
         flash,
         watchdog,
         stopwatch,
@@ -73,7 +74,7 @@ fn start() -> Commands<CommandIn, CommandOut, BoardFlash> {
         .init_with(|| Controller::new(Planner::new(robot, to_motion), settings, identity));
 
     control.spawn(defmt::unwrap!(control_task(
-        motion, link, frames, outputs, stopwatch, watchdog
+        motion, link, frames, outputs, arm, stopwatch, watchdog
     )));
     setpoints.spawn(defmt::unwrap!(setpoint_task(frames, setpoint_out)));
     Commands {
@@ -92,10 +93,11 @@ async fn control_task(
     link: &'static Link,
     frames: &'static Frames,
     outputs: BoardOutputs,
+    arm: BoardArm,
     stopwatch: Counter,
     watchdog: BoardWatchdog,
 ) {
-    control::run(motion, link, frames, outputs, stopwatch, watchdog).await
+    control::run(motion, link, frames, outputs, arm, stopwatch, watchdog).await
 }
 
 #[embassy_executor::task]

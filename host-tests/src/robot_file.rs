@@ -136,6 +136,7 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
             "tolerance" => vec!["motion.corner_tolerance_mm"],
             "rapid" => vec!["motion.rapid_mm_s"],
             "feed-limit" => vec!["motion.feed_limit_mm_s"],
+            "joint-speed" => vec!["motion.joint_speed_deg_s"],
             _ => vec!["motion.yaw_limit_deg_s"],
         },
     }
@@ -200,6 +201,7 @@ struct MotionTable {
     rapid_mm_s: Option<f32>,
     feed_limit_mm_s: Option<f32>,
     yaw_limit_deg_s: Option<f32>,
+    joint_speed_deg_s: Option<f32>,
 }
 
 #[derive(Deserialize, Default)]
@@ -256,6 +258,7 @@ impl Tables {
         set(&mut robot.rapid_mm_s, motion.rapid_mm_s);
         set(&mut robot.feed_limit_mm_s, motion.feed_limit_mm_s);
         set(&mut robot.yaw_limit_deg_s, motion.yaw_limit_deg_s);
+        set(&mut robot.joint_speed_deg_s, motion.joint_speed_deg_s);
         RobotSettings {
             plant: self.plant.config(&robot),
             robot,

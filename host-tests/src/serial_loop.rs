@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 
+use crate::switched_arm::SwitchedArm;
 use fixed::traits::ToFixed;
 use planner_core::config::Robot;
 use planner_core::motion::{DelayLines, Motion, Order, Setpoint};
@@ -32,6 +33,8 @@ pub struct SerialLoop<'q> {
     pub records: Records,
     /// The board's inputs, as the next tick reports them.
     pub inputs: Inputs,
+    /// An arm with limit switches, whose inputs count then.
+    pub arm: Option<SwitchedArm>,
     /// What absolute encoders read, if there are any.
     pub encoders: Option<JointPosition>,
     /// Whether what is to be kept is kept.
@@ -68,6 +71,7 @@ pub fn with_controller<R>(records: Records, body: impl FnOnce(&mut SerialLoop<'_
         obeyed: 0,
         records,
         inputs: Inputs::default(),
+        arm: None,
         encoders: None,
         store_works: true,
         banners: 0,
@@ -142,6 +146,11 @@ impl SerialLoop<'_> {
         self.banners
     }
 
+    /// The robot that planning uses.
+    pub fn robot(&self) -> &Robot {
+        self.controller.robot()
+    }
+
     /// What encoders read with the tool at a point.
     pub fn joints_at(&self, x_mm: f64, y_mm: f64) -> JointPosition {
         let pose = Pose {
@@ -177,10 +186,18 @@ impl SerialLoop<'_> {
     pub fn tick_watched(&mut self, mut watch: impl FnMut(&Self)) {
         self.now_ms += 1;
         let before = self.report.setpoint.pose;
+        if let Some(arm) = &self.arm {
+            self.inputs.limits = arm.limits();
+        }
+        self.motion.see_limits(self.inputs.limits);
         let setpoint = self.motion.tick();
+        if let Some(arm) = &mut self.arm {
+            arm.follow(&setpoint);
+        }
         self.report = Report {
             setpoint,
             previous_pose: before,
+            progress: self.motion.progress(),
             orders: self.obeyed,
             inputs: self.inputs,
             encoders: self.encoders,

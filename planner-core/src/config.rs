@@ -20,6 +20,8 @@ pub struct RobotConfig {
     pub feed_limit_mm_s: f32,
     /// Fastest turn of the yaw in °/s, above 0 to 10 000.
     pub yaw_limit_deg_s: f32,
+    /// Speed of joints 1, 2 and 4 while the elbow changes its side, in °/s, above 0 to 10 000.
+    pub joint_speed_deg_s: f32,
 }
 
 impl Default for RobotConfig {
@@ -31,6 +33,7 @@ impl Default for RobotConfig {
             rapid_mm_s: 160.0,
             feed_limit_mm_s: 1000.0,
             yaw_limit_deg_s: 360.0,
+            joint_speed_deg_s: 90.0,
         }
     }
 }
@@ -115,6 +118,7 @@ impl Robot {
             ("rapid", config.rapid_mm_s, 0.001, 10_000.0),
             ("feed-limit", config.feed_limit_mm_s, 0.001, 10_000.0),
             ("yaw-limit", config.yaw_limit_deg_s, 0.001, 10_000.0),
+            ("joint-speed", config.joint_speed_deg_s, 0.001, 10_000.0),
         ];
         for (name, value, low, high) in checks {
             if !(low..=high).contains(&value) {
@@ -135,6 +139,12 @@ impl Robot {
             decelerating: prefilter.reversed_response(),
             prefilter,
         })
+    }
+
+    /// Changes the side of the elbow.
+    pub fn set_elbow(&mut self, elbow: Elbow) {
+        self.config.scara.elbow = elbow;
+        self.scara.set_elbow(elbow);
     }
 
     /// Changes the prefilter.
@@ -201,7 +211,7 @@ impl fmt::Display for SettingValue {
 impl RobotConfig {
     /// Names of all settings, in groups whose values must fit each other: lengths in mm, angles
     /// in °, the frequency in Hz, feedrates in mm/s, the yaw limit in °/s.
-    pub const GROUPS: [&'static [&'static str]; 10] = [
+    pub const GROUPS: [&'static [&'static str]; 11] = [
         &["link1", "link2"],
         &["elbow", "joint2-min", "joint2-max", "singularity-margin"],
         &["joint1-min", "joint1-max"],
@@ -212,6 +222,7 @@ impl RobotConfig {
         &["rapid"],
         &["feed-limit"],
         &["yaw-limit"],
+        &["joint-speed"],
     ];
 
     /// Sets values from `name=value` texts between blanks, as a `$` line carries them.
@@ -294,6 +305,7 @@ impl RobotConfig {
             "rapid" => Slot::Number(&mut self.rapid_mm_s),
             "feed-limit" => Slot::Number(&mut self.feed_limit_mm_s),
             "yaw-limit" => Slot::Number(&mut self.yaw_limit_deg_s),
+            "joint-speed" => Slot::Number(&mut self.joint_speed_deg_s),
             _ => return None,
         })
     }

@@ -8,6 +8,7 @@ mod arcs;
 pub mod config;
 pub mod corner;
 pub mod gcode;
+pub mod joint_space;
 pub mod kinematics;
 pub mod math;
 pub mod motion;

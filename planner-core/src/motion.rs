@@ -2,8 +2,9 @@
 
 use crate::arcs::{ARC_CHANNELS, ArcFilters, Arcs};
 use crate::config::Robot;
-use crate::kinematics::Scara;
-use crate::pose::{AXES, JointState, Pose};
+use crate::joint_space::{self, Space};
+use crate::kinematics::{Elbow, Scara};
+use crate::pose::{AXES, JointPosition, JointState, Pose};
 use crate::prefilter::{Convolver, FINE_BITS, Kernel};
 use crate::queue::{Action, RawItem, SegmentConsumer};
 use crate::rate::Rate;
@@ -42,6 +43,14 @@ pub enum Order {
     Resume,
     /// Stop on the path as soon as possible, then forget what is queued and go idle.
     Stop,
+    /// As [`Order::Start`], and as [`Order::Stop`] in the tick in which a limit input is as
+    /// wanted: [`Progress::touched`] tells where.
+    Seek {
+        /// Which limit input, from 0.
+        joint: u8,
+        /// Whether it is wanted active.
+        active: bool,
+    },
     /// Go faster or slower from now on.
     Rates {
         /// Part of the programmed feedrates, 10 to 200 %.
@@ -62,6 +71,27 @@ pub struct Setpoint {
     pub state: MotionState,
     /// The digital outputs: bit 0 the gripper, bit 1 the blow-off.
     pub outputs: u8,
+    /// The position was set in this tick, not moved to: by [`Order::Place`] or by other settings.
+    pub placed: bool,
+}
+
+/// How far the motion has come, apart from its setpoint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Progress {
+    /// The number of the line under way; that of the last one while nothing is.
+    pub line: u32,
+    /// What the raw path moves.
+    pub space: Space,
+    /// Where its joint was when the limit input of the last [`Order::Seek`] was as wanted, in
+    /// bits of [`JointPosition`].
+    pub touched: Option<i32>,
+}
+
+/// A limit input that is waited for.
+#[derive(Clone, Copy, Debug)]
+struct Seek {
+    joint: u8,
+    active: bool,
 }
 
 /// The delay lines of the filters: most of the core's memory, 25 KiB, apart from [`Motion`] so
@@ -104,6 +134,12 @@ pub struct Motion<'q> {
     /// Ticks since the raw path last moved.
     stood_for: u16,
     outputs: u8,
+    space: Space,
+    /// Limit inputs of joints 1 to 4, from bit 0.
+    limits: u8,
+    seek: Option<Seek>,
+    touched: Option<i32>,
+    placed: bool,
 }
 
 /// What the motion is doing.
@@ -146,7 +182,17 @@ impl<'q> Motion<'q> {
             mode: Mode::Idle,
             stood_for: u16::MAX,
             outputs: 0,
+            space: Space::Tool,
+            limits: 0,
+            seek: None,
+            touched: None,
+            placed: false,
         }
+    }
+
+    /// The limit inputs of joints 1 to 4, from bit 0, as they are before the next tick.
+    pub fn see_limits(&mut self, limits: u8) {
+        self.limits = limits;
     }
 
     /// Does what is asked, from this tick on.
@@ -157,6 +203,11 @@ impl<'q> Motion<'q> {
             Order::Hold => self.hold(),
             Order::Resume => self.resume(),
             Order::Stop => self.stop(),
+            Order::Seek { joint, active } => {
+                self.touched = None;
+                self.seek = Some(Seek { joint, active });
+                self.start();
+            }
             Order::Rates {
                 feed_percent,
                 rapid_percent,
@@ -170,9 +221,13 @@ impl<'q> Motion<'q> {
     /// Changes the robot's settings. Only while idle; otherwise nothing happens.
     pub fn set_robot(&mut self, robot: &Robot) {
         if self.mode == Mode::Idle {
+            let pose = self.pose();
+            let joints = self.kinematics.inverse(&pose);
             self.kernel = robot.kernel.clone();
             self.kinematics = robot.scara.clone();
             self.rest_at(self.nearest_point());
+            // Another arm at the same pose.
+            self.placed |= self.space == Space::Tool && self.kinematics.inverse(&pose) != joints;
         }
     }
 
@@ -183,7 +238,9 @@ impl<'q> Motion<'q> {
             Mode::Running | Mode::Holding | Mode::Stopping | Mode::Forgetting => false,
         };
         if stands {
+            self.space = Space::Tool;
             self.rest_at(pose.to_bits());
+            self.placed = true;
         }
     }
 
@@ -220,6 +277,7 @@ impl<'q> Motion<'q> {
     /// The setpoint of this tick.
     #[must_use]
     pub fn tick(&mut self) -> Setpoint {
+        self.watch_limits();
         let newest = match self.mode {
             Mode::Running | Mode::Holding | Mode::Stopping => self.command(),
             Mode::Idle | Mode::Held | Mode::Paused => self.history[1],
@@ -230,16 +288,55 @@ impl<'q> Motion<'q> {
         };
         let [before, now] = self.history;
         self.history = [now, newest];
-        let pose = Pose::from_bits(now.map(|value| round_off(value) as i32));
+        let point = now.map(|value| round_off(value) as i32);
         let coming = difference(&newest, &now);
         let going = difference(&now, &before);
-        let velocity = sum(&coming, &going).map(velocity_of);
-        let acceleration = difference(&coming, &going).map(acceleration_of);
+        let twice = sum(&coming, &going);
+        let bend = difference(&coming, &going);
+        let (pose, joints) = match self.space {
+            Space::Tool => {
+                let pose = Pose::from_bits(point);
+                let (velocity, acceleration) = (twice.map(velocity_of), bend.map(acceleration_of));
+                let joints = self.kinematics.joint_state(&pose, velocity, acceleration);
+                (pose, joints)
+            }
+            Space::Joints => {
+                let position = JointPosition::from_bits(point);
+                let joints = joint_space::state(position, twice, bend);
+                (self.kinematics.forward(&position), joints)
+            }
+        };
         Setpoint {
             pose,
-            joints: self.kinematics.joint_state(&pose, velocity, acceleration),
+            joints,
             state: self.state(),
             outputs: self.outputs,
+            placed: core::mem::take(&mut self.placed),
+        }
+    }
+
+    /// How far the motion has come.
+    #[must_use]
+    pub fn progress(&self) -> Progress {
+        Progress {
+            line: self.walker.line(),
+            space: self.space,
+            touched: self.touched,
+        }
+    }
+
+    /// Stops for good where the limit input that is waited for is as wanted.
+    fn watch_limits(&mut self) {
+        let moves_joints = self.mode == Mode::Running && self.space == Space::Joints;
+        let Some(seek) = self.seek.filter(|_| moves_joints) else {
+            return;
+        };
+        let is_active = self.limits & 1_u8.wrapping_shl(u32::from(seek.joint)) != 0;
+        if is_active == seek.active {
+            let [sent, _] = self.history;
+            let at = sent.get(usize::from(seek.joint)).copied();
+            self.touched = at.map(|value| round_off(value) as i32);
+            self.stop();
         }
     }
 
@@ -302,16 +399,50 @@ impl<'q> Motion<'q> {
             Some(Action::Outputs(outputs)) => self.outputs = outputs,
             Some(Action::Pause) => self.mode = Mode::Paused,
             Some(Action::Prefilter) => self.change_prefilter(),
+            Some(Action::ToJoints) => self.enter_joints(),
+            Some(Action::ToTool(pose, elbow)) => self.enter_tool(pose, elbow),
             None => {}
         }
         if self.mode == Mode::Running && self.walker.is_done() {
             self.mode = Mode::Idle;
+            self.seek = None;
+        }
+    }
+
+    /// Goes on with joint moves, from where the joints are.
+    fn enter_joints(&mut self) {
+        if self.space == Space::Tool {
+            let pose = Pose::from_bits(self.nearest_point());
+            self.space = Space::Joints;
+            self.rest_at(self.kinematics.inverse(&pose).to_bits());
+        }
+    }
+
+    /// Goes on with moves of the tool, which stands at the pose; without one it stands where
+    /// the setpoint is, and the elbow is said to be on that side.
+    fn enter_tool(&mut self, pose: Option<Pose>, elbow: Elbow) {
+        let pose = pose.unwrap_or_else(|| {
+            self.placed = true;
+            self.pose()
+        });
+        self.kinematics.set_elbow(elbow);
+        self.space = Space::Tool;
+        self.rest_at(pose.to_bits());
+    }
+
+    /// Where the tool stands.
+    fn pose(&self) -> Pose {
+        let point = self.nearest_point();
+        match self.space {
+            Space::Tool => Pose::from_bits(point),
+            Space::Joints => self.kinematics.forward(&JointPosition::from_bits(point)),
         }
     }
 
     /// Stays where everything stands, and begins to empty the queue.
     fn forget(&mut self) {
         self.rest_at(self.nearest_point());
+        self.seek = None;
         self.mode = Mode::Forgetting;
     }
 

@@ -7,13 +7,14 @@ use crate::gcode::{
     self, Command, Defaults, Feed, Interpreted, Interpreter, Line, MAX_ACTIONS_A_LINE, Move,
     Offsets, ProgramFlow, RobotChange,
 };
-use crate::kinematics::{PoseError, SegmentError};
+use crate::kinematics::{Elbow, PoseError, Scara, SegmentError};
 use crate::path::PathSegment;
-use crate::pose::Pose;
+use crate::pose::{JointPosition, Pose};
 use crate::prefilter::{Kernel, Prefilter, PrefilterConfig, PrefilterError};
 use crate::queue::SegmentProducer;
 use crate::raw::{LONGEST_S, Pace};
 use crate::schedule::{Schedule, Timing};
+use crate::units::AngleRad;
 
 /// What became of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,8 +53,6 @@ pub enum Cause {
     Jog(SegmentError),
     /// The prefilter of M100.
     Prefilter(PrefilterError),
-    /// M101 and M102: the arm would have to pass its stretched pose.
-    Elbow,
     /// The segment would take more than a day.
     TooSlow {
         /// How long it would take.
@@ -78,7 +77,6 @@ impl LineError {
             Cause::TooSlow { .. } => 73,
             Cause::Full => 74,
             Cause::Prefilter(_) => 76,
-            Cause::Elbow => 79,
         }
     }
 }
@@ -99,9 +97,6 @@ impl fmt::Display for LineError {
             Cause::Pose(error) => error.fmt(f),
             Cause::Segment(error) | Cause::Jog(error) => error.fmt(f),
             Cause::Prefilter(error) => error.fmt(f),
-            Cause::Elbow => f.write_str(
-                "the elbow cannot change its side inside a program: set $elbow at rest, and home",
-            ),
             Cause::TooSlow { duration_s } => write!(
                 f,
                 "the segment would take {duration_s:.0} s, more than a day: give a higher feedrate"
@@ -123,6 +118,18 @@ pub struct Planner<'q> {
     /// The state after the lines checked, while lines are checked only.
     checking: Option<Interpreter>,
     schedule: Schedule<'q>,
+    /// Where the joints stand, if a joint move was stopped on its way.
+    joints: Option<JointPosition>,
+}
+
+/// A move of the joints that changes the elbow's side.
+struct ElbowMove {
+    elbow: Elbow,
+    from: JointPosition,
+    to: JointPosition,
+    /// Where the tool is at its end.
+    pose: Pose,
+    duration_s: f64,
 }
 
 impl<'q> Planner<'q> {
@@ -134,6 +141,7 @@ impl<'q> Planner<'q> {
             interpreter: Interpreter::new(defaults(robot)),
             checking: None,
             schedule: Schedule::new(queue),
+            joints: None,
         }
     }
 
@@ -206,7 +214,7 @@ impl<'q> Planner<'q> {
             .interpret(line)
             .map_err(Cause::Gcode)
             .and_then(|interpreted| {
-                self.timings(&interpreted.command)?;
+                self.check_with_elbow(interpreter.modal().elbow(), &interpreted.command)?;
                 Ok(interpreted)
             });
         match &checked {
@@ -218,6 +226,14 @@ impl<'q> Planner<'q> {
         checked.map(drop).map_err(|cause| LineError { line, cause })
     }
 
+    /// Checks a command with the elbow on the side to which the lines before have brought it.
+    #[inline(never)]
+    fn check_with_elbow(&self, elbow: Elbow, command: &Command) -> Result<(), Cause> {
+        let mut scara = self.robot.scara.clone();
+        scara.set_elbow(elbow);
+        self.timings(&scara, command).map(drop)
+    }
+
     /// Whether the line would be accepted now; changes nothing but the count of refusals.
     ///
     /// # Errors
@@ -225,7 +241,7 @@ impl<'q> Planner<'q> {
     pub fn would_accept(&mut self, line: &Line) -> Result<(), LineError> {
         let interpreted = self.interpreter.interpret(line);
         let interpreted = interpreted.map_err(|error| self.refused(error))?;
-        let checked = self.timings(&interpreted.command);
+        let checked = self.timings(&self.robot.scara, &interpreted.command);
         checked.map(drop).map_err(|cause| self.refusal(cause))
     }
 
@@ -238,7 +254,43 @@ impl<'q> Planner<'q> {
     /// Goes on from where the motion has been stopped, the queue being empty.
     pub fn stopped_at(&mut self, pose: Pose) {
         self.interpreter.set_position(Some(pose));
+        self.joints = None;
         self.schedule.reset();
+    }
+
+    /// Goes on from where a joint move has been stopped, the queue being empty.
+    pub fn stopped_at_joints(&mut self, joints: JointPosition) {
+        let pose = self.know_joints(&joints);
+        self.stopped_at(pose);
+        self.joints = Some(joints);
+    }
+
+    /// The joints are said to be here, by encoders or limit inputs. Yields the tool's pose,
+    /// where the motion has to be placed with [`Planner::robot`].
+    pub fn place_joints(&mut self, joints: &JointPosition) -> Pose {
+        let pose = self.know_joints(joints);
+        self.stopped_at(pose);
+        pose
+    }
+
+    fn know_joints(&mut self, joints: &JointPosition) -> Pose {
+        let elbow = Elbow::of(joints.joint2);
+        self.robot.set_elbow(elbow);
+        self.interpreter.set_elbow(elbow);
+        self.robot.scara.forward(joints)
+    }
+
+    /// The position is not known any more.
+    pub fn forget_position(&mut self) {
+        self.interpreter.set_position(None);
+        self.joints = None;
+        self.schedule.reset();
+    }
+
+    /// Moves the joints in `duration_s`, to find limit inputs: the position is not known then.
+    /// The queue has to be empty.
+    pub fn move_joints(&mut self, from: JointPosition, to: JointPosition, duration_s: f64) {
+        self.schedule.move_joints(from, to, duration_s);
     }
 
     /// Counts a line that could not be read.
@@ -258,10 +310,15 @@ impl<'q> Planner<'q> {
         self.interpreter.set_offsets(offsets);
     }
 
-    /// Changes the robot's settings. Only while everything stands.
+    /// Changes the robot's settings. Only while everything stands. Where the position is known
+    /// the elbow stays on its side.
     pub fn set_robot(&mut self, robot: &Robot) {
+        let elbow = self.robot.config.scara.elbow;
         self.robot = robot.clone();
-        self.interpreter.set_defaults(defaults(robot));
+        if self.interpreter.modal().position().is_some() {
+            self.robot.set_elbow(elbow);
+        }
+        self.interpreter.set_defaults(defaults(&self.robot));
         self.reset_modes();
         self.schedule.reset();
     }
@@ -275,17 +332,34 @@ impl<'q> Planner<'q> {
     /// Queues the actions of a line, all or none, and commits what it leaves behind.
     fn carry_out(&mut self, interpreted: &Interpreted) -> Result<Accepted, Cause> {
         let command = &interpreted.command;
-        let timings = self.timings(command)?;
+        let timings = self.timings(&self.robot.scara, command)?;
         if !self.has_room() {
             return Err(Cause::Full);
         }
         if command.reference.is_some() {
             self.schedule.reset();
+            self.joints = None;
         }
         let mut queued = false;
-        if let Some(RobotChange::Prefilter(config)) = &command.robot {
-            self.robot.set_prefilter(config).map_err(Cause::Prefilter)?;
-            queued |= self.schedule.change_prefilter(&self.robot.kernel);
+        let mut folded = None;
+        match &command.robot {
+            Some(RobotChange::Prefilter(config)) => {
+                self.robot.set_prefilter(config).map_err(Cause::Prefilter)?;
+                queued |= self.schedule.change_prefilter(&self.robot.kernel);
+            }
+            Some(RobotChange::Elbow(elbow)) => {
+                let change = self.elbow_move(&self.robot.scara, *elbow)?;
+                folded = change.as_ref().map(|change| change.pose);
+                queued |= self.change_elbow(*elbow, change.as_ref());
+            }
+            None => {}
+        }
+        let moves_tool = command.dwell_s.is_some() || command.moves().next().is_some();
+        if moves_tool && self.joints.take().is_some() {
+            let position = self.interpreter.modal().position();
+            queued |= self
+                .schedule
+                .to_tool(position, self.robot.config.scara.elbow);
         }
         if let Some(outputs) = command.outputs {
             queued |= self.schedule.switch(outputs);
@@ -295,14 +369,21 @@ impl<'q> Planner<'q> {
         }
         for (order, timing) in command.moves().zip(&timings) {
             queued |= timing.duration_s > 0.0
-                && self
-                    .schedule
-                    .plan(&self.robot, &order.path, timing, order.corner_tolerance_mm);
+                && self.schedule.plan(
+                    &self.robot,
+                    &order.path,
+                    timing,
+                    order.corner_tolerance_mm,
+                    order.line,
+                );
         }
         if let Some(outputs) = command.outputs_after {
             queued |= self.schedule.switch(outputs);
         }
         self.interpreter.commit(interpreted);
+        if folded.is_some() {
+            self.interpreter.set_position(folded);
+        }
         if command.flow == Some(ProgramFlow::Pause) {
             queued |= self.schedule.pause();
         }
@@ -315,23 +396,82 @@ impl<'q> Planner<'q> {
         })
     }
 
+    /// Changes the elbow's side, by a move of the joints where the position is known.
+    fn change_elbow(&mut self, elbow: Elbow, change: Option<&ElbowMove>) -> bool {
+        let is_known = self.interpreter.modal().position().is_some();
+        let is_other = elbow != self.robot.config.scara.elbow;
+        self.robot.set_elbow(elbow);
+        match change {
+            Some(change) => {
+                self.joints = None;
+                self.schedule
+                    .move_joints(change.from, change.to, change.duration_s)
+                    && self.schedule.to_tool(Some(change.pose), change.elbow)
+            }
+            None => is_other && !is_known && self.schedule.to_tool(None, elbow),
+        }
+    }
+
+    /// The move of the joints that brings the elbow to a side with the tool where it is. An arm
+    /// that was stopped near its stretched pose folds as far as the margin asks.
+    /// Not inlined, so that the other arm is on the stack for a moment only.
+    #[inline(never)]
+    fn elbow_move(&self, scara: &Scara, elbow: Elbow) -> Result<Option<ElbowMove>, Cause> {
+        let Some(position) = self.interpreter.modal().position() else {
+            return Ok(None);
+        };
+        if elbow == self.robot.config.scara.elbow && self.joints.is_none() {
+            return Ok(None);
+        }
+        let from = self.joints.unwrap_or_else(|| scara.inverse(&position));
+        let mut scara = scara.clone();
+        scara.set_elbow(elbow);
+        let (pose, to) = match (scara.check(&position), self.joints) {
+            (Ok(to), _) => (position, to),
+            (Err(_), Some(joints)) => {
+                let pose = scara.folded(&joints);
+                (pose, scara.check(&pose).map_err(Cause::Pose)?)
+            }
+            (Err(error), None) => return Err(Cause::Pose(error)),
+        };
+        let ways = from.to_bits().into_iter().zip(to.to_bits());
+        let furthest = ways.map(|(from, to)| to.abs_diff(from)).max().unwrap_or(0);
+        let furthest_rad = f64::from(AngleRad::DELTA) * f64::from(furthest);
+        let speed_rad_s = f64::from(self.robot.config.joint_speed_deg_s).to_radians();
+        Ok(Some(ElbowMove {
+            elbow,
+            from,
+            to,
+            pose,
+            duration_s: furthest_rad / speed_rad_s,
+        }))
+    }
+
     /// How long each motion of a line takes, once the robot can do all that the line asks for.
-    fn timings(&self, command: &Command) -> Result<[Timing; 2], Cause> {
+    fn timings(&self, scara: &Scara, command: &Command) -> Result<[Timing; 2], Cause> {
         match &command.robot {
             Some(RobotChange::Prefilter(config)) => {
                 Self::check_prefilter(config).map_err(Cause::Prefilter)?;
             }
-            Some(RobotChange::Elbow(elbow)) if *elbow != self.robot.config.scara.elbow => {
-                return Err(Cause::Elbow);
+            Some(RobotChange::Elbow(elbow)) => {
+                self.elbow_move(scara, *elbow)?;
             }
-            Some(RobotChange::Elbow(_)) | None => {}
+            None => {}
         }
         if let Some(pose) = &command.reference {
-            self.robot.scara.check(pose).map_err(Cause::Pose)?;
+            scara.check(pose).map_err(Cause::Pose)?;
+        }
+        // A dwell stands where a move may begin only.
+        if let (Some(_), Some(pose), Some(_)) = (
+            self.joints,
+            self.interpreter.modal().position(),
+            command.dwell_s,
+        ) {
+            scara.check(&pose).map_err(Cause::Pose)?;
         }
         let mut timings = [Timing::default(); 2];
         for (order, timing) in command.moves().zip(&mut timings) {
-            *timing = self.checked_timing(order)?;
+            *timing = self.checked_timing(scara, order)?;
         }
         Ok(timings)
     }
@@ -342,7 +482,7 @@ impl<'q> Planner<'q> {
     }
 
     /// How long a motion takes; zero if it is shorter than anything.
-    fn checked_timing(&self, order: &Move) -> Result<Timing, Cause> {
+    fn checked_timing(&self, scara: &Scara, order: &Move) -> Result<Timing, Cause> {
         let timing = self.timing(&order.path, order.feed);
         if timing.duration_s > LONGEST_S {
             return Err(Cause::TooSlow {
@@ -350,7 +490,7 @@ impl<'q> Planner<'q> {
             });
         }
         if timing.duration_s > 0.0 {
-            let checked = self.robot.scara.check_segment(&order.path);
+            let checked = scara.check_segment(&order.path);
             checked.map_err(Cause::Segment)?;
         }
         Ok(timing)

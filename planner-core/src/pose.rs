@@ -55,6 +55,30 @@ pub struct JointPosition {
     pub joint4: AngleRad,
 }
 
+impl JointPosition {
+    /// The raw bits of joints 1, 2, 4 (2^-26 rad) and 3 (2^-19 mm), in the order of the joints.
+    #[must_use]
+    pub const fn to_bits(self) -> [i32; AXES] {
+        [
+            self.joint1.to_bits(),
+            self.joint2.to_bits(),
+            self.joint3.to_bits(),
+            self.joint4.to_bits(),
+        ]
+    }
+
+    /// The inverse of [`JointPosition::to_bits`].
+    #[must_use]
+    pub const fn from_bits([joint1, joint2, joint3, joint4]: [i32; AXES]) -> Self {
+        Self {
+            joint1: AngleRad::from_bits(joint1),
+            joint2: AngleRad::from_bits(joint2),
+            joint3: LengthMm::from_bits(joint3),
+            joint4: AngleRad::from_bits(joint4),
+        }
+    }
+}
+
 /// What the joints have to do at one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointState {

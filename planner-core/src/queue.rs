@@ -2,6 +2,8 @@
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
+use crate::kinematics::Elbow;
+use crate::pose::Pose;
 use crate::prefilter::Kernel;
 use crate::raw::RawSegment;
 
@@ -32,6 +34,11 @@ pub enum Action {
     Pause,
     /// The oldest kernel that waits becomes the prefilter.
     Prefilter,
+    /// The segments that follow are joint moves: see [`crate::joint_space`].
+    ToJoints,
+    /// The segments that follow are the tool's again. It stands at the pose, with the elbow on
+    /// the side; without a pose, its position is not known.
+    ToTool(Option<Pose>, Elbow),
 }
 
 /// The queue between planner and tick; one place stays empty to tell full from empty.

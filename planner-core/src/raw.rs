@@ -7,7 +7,7 @@
 use crate::math::sin_cos;
 use crate::path::PathSegment;
 use crate::path::{Arc, Shape};
-use crate::pose::{AXES, Pose};
+use crate::pose::{AXES, JointPosition, Pose};
 use crate::rate::Rate;
 use crate::units::TICK_HZ;
 
@@ -52,6 +52,8 @@ pub struct RawSegment {
     pub top_rate: Rate,
     /// What sets its rate.
     pub pace: Pace,
+    /// The number of the line that it comes from, for status reports.
+    pub line: u32,
 }
 
 /// Which override a segment follows.
@@ -85,6 +87,23 @@ impl RawSegment {
             },
             top_rate: Rate::ONE,
             pace: Pace::Feed,
+            line: 0,
+        }
+    }
+
+    /// A move of the joints from one position to another in `duration_s` (one tick to
+    /// [`LONGEST_S`]), each at constant speed.
+    #[must_use]
+    pub fn of_joints(from: JointPosition, to: JointPosition, duration_s: f64) -> Self {
+        let rest = PathSegment {
+            start: Pose::default(),
+            target: Pose::default(),
+            shape: Shape::Line,
+        };
+        Self {
+            start: from.to_bits(),
+            target: to.to_bits(),
+            ..Self::new(&rest, duration_s)
         }
     }
 

@@ -8,9 +8,10 @@ use heapless::Deque;
 
 use crate::config::Robot;
 use crate::corner::{self, Corner, Side, reach_s};
+use crate::kinematics::Elbow;
 use crate::math::sqrt_f32;
 use crate::path::PathSegment;
-use crate::pose::Pose;
+use crate::pose::{JointPosition, Pose};
 use crate::prefilter::{Kernel, Response};
 use crate::queue::{Action, RawItem, SegmentProducer};
 use crate::rate::Rate;
@@ -108,6 +109,7 @@ impl<'q> Schedule<'q> {
         path: &PathSegment,
         timing: &Timing,
         tolerance_mm: f32,
+        line: u32,
     ) -> bool {
         let length_mm = path.length_mm() as f32;
         let duration_s = timing.duration_s.clamp(TICK_S, LONGEST_S);
@@ -129,6 +131,7 @@ impl<'q> Schedule<'q> {
         let segment = RawSegment {
             overlap,
             pace: timing.pace,
+            line,
             ..RawSegment::new(path, duration_s)
         };
         let passed = robot.kernel.length() - overlap + segment.duration;
@@ -181,6 +184,25 @@ impl<'q> Schedule<'q> {
             self.reset();
         }
         queued
+    }
+
+    /// Moves the joints after everything has stopped. What follows is joint moves too, until
+    /// [`Schedule::to_tool`].
+    ///
+    /// `false` if the look-ahead is full.
+    pub fn move_joints(&mut self, from: JointPosition, to: JointPosition, duration_s: f64) -> bool {
+        let duration_s = duration_s.clamp(TICK_S, LONGEST_S);
+        let segment = RawSegment::of_joints(from, to, duration_s);
+        self.push_stopped(RawItem::Action(Action::ToJoints))
+            && self.push_stopped(RawItem::Segment(segment))
+    }
+
+    /// Goes on with moves of the tool, which then stands at a pose, if that is known, with the
+    /// elbow on a side.
+    ///
+    /// `false` if the look-ahead is full.
+    pub fn to_tool(&mut self, pose: Option<Pose>, elbow: Elbow) -> bool {
+        self.push_stopped(RawItem::Action(Action::ToTool(pose, elbow)))
     }
 
     /// Queues what comes after an exact stop; the path goes on from rest.

@@ -1,5 +1,8 @@
 //! The setpoint stream: one frame a control tick, from the controller to the drives.
 //!
+//! A frame that is **placed** says where the joints are, and not where to go: a drive takes its
+//! position as the one it has, and does not move. The others a drive follows.
+//!
 //! A frame is 78 bytes, little endian, followed by their CRC-32 (ISO-HDLC), the
 //! whole COBS-coded and closed by a zero byte: 84 bytes on the wire, 840 kBd at
 //! 1 kHz. A receiver that starts in the middle, or that loses bytes, is in step
@@ -8,7 +11,7 @@
 //! | offset | field | |
 //! |---|---|---|
 //! | 0 | sequence | u32, one more each tick |
-//! | 4 | state | u8, 0 idle, 1 running, 2 stopping, 3 held, 4 paused |
+//! | 4 | state | u8, 0 idle, 1 running, 2 stopping, 3 held, 4 paused; bit 7: placed |
 //! | 5 | pose | 4 × i32, raw bits of X, Y, Z (2^-19 mm) and C (2^-19 °) |
 //! | 21 | joint position | 4 × i32, raw bits (2^-26 rad; joint 3 2^-19 mm) |
 //! | 37 | joint velocity | 4 × f32, rad/s and mm/s |
@@ -18,8 +21,7 @@
 //! | 77 | outputs | u8, bit 0 gripper, bit 1 blow-off |
 
 use crate::motion::{MotionState, Setpoint};
-use crate::pose::{AXES, JointPosition, JointState, Pose};
-use crate::units::{AngleRad, LengthMm};
+use crate::pose::{JointPosition, JointState, Pose};
 
 /// Bytes of a frame before the CRC.
 const BODY_BYTES: usize = 78;
@@ -29,6 +31,9 @@ const CHECKED_BYTES: usize = BODY_BYTES + 4;
 
 /// Bytes of a frame on the wire, the closing zero included.
 pub const FRAME_BYTES: usize = cobs::max_encoding_length(CHECKED_BYTES) + 1;
+
+/// Marks a position that was set, in the byte of the state.
+const PLACED: u8 = 1 << 7;
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
@@ -64,11 +69,12 @@ impl SetpointFrame {
         let mut body = [0; BODY_BYTES];
         let mut rest = body.as_mut_slice();
         put(&mut rest, self.sequence.to_le_bytes());
-        put(&mut rest, [state_to_byte(self.setpoint.state)]);
+        let placed = if self.setpoint.placed { PLACED } else { 0 };
+        put(&mut rest, [state_to_byte(self.setpoint.state) | placed]);
         for bits in self.setpoint.pose.to_bits() {
             put(&mut rest, bits.to_le_bytes());
         }
-        for bits in position_to_bits(joints.position) {
+        for bits in joints.position.to_bits() {
             put(&mut rest, bits.to_le_bytes());
         }
         for value in joints.velocity.iter().chain(&joints.acceleration) {
@@ -98,11 +104,12 @@ impl SetpointFrame {
             setpoint: Setpoint {
                 pose,
                 joints: JointState {
-                    position: position_from_bits(position),
+                    position: JointPosition::from_bits(position),
                     velocity,
                     acceleration,
                 },
-                state: state_from_byte(state)?,
+                state: state_from_byte(state & !PLACED)?,
+                placed: state & PLACED != 0,
                 outputs,
             },
             tick_cost,
@@ -148,24 +155,6 @@ fn state_from_byte(byte: u8) -> Option<MotionState> {
         3 => Some(MotionState::Held),
         4 => Some(MotionState::Paused),
         _ => None,
-    }
-}
-
-fn position_to_bits(position: JointPosition) -> [i32; AXES] {
-    [
-        position.joint1.to_bits(),
-        position.joint2.to_bits(),
-        position.joint3.to_bits(),
-        position.joint4.to_bits(),
-    ]
-}
-
-fn position_from_bits([joint1, joint2, joint3, joint4]: [i32; AXES]) -> JointPosition {
-    JointPosition {
-        joint1: AngleRad::from_bits(joint1),
-        joint2: AngleRad::from_bits(joint2),
-        joint3: LengthMm::from_bits(joint3),
-        joint4: AngleRad::from_bits(joint4),
     }
 }
 
@@ -264,12 +253,13 @@ mod tests {
             setpoint: Setpoint {
                 pose: Pose::from_bits([1, -2, 0x0003_0000, i32::MIN]),
                 joints: JointState {
-                    position: position_from_bits([i32::MAX, 0, -1, 0x0100]),
+                    position: JointPosition::from_bits([i32::MAX, 0, -1, 0x0100]),
                     velocity: [0.0, -0.0, 1.5, f32::MIN_POSITIVE],
                     acceleration: [-1e9, 0.25, 0.0, 3.0],
                 },
                 state: MotionState::Running,
                 outputs: 2,
+                placed: true,
             },
             tick_cost: 1999,
             overruns: 3,
@@ -280,7 +270,7 @@ mod tests {
     #[test]
     fn the_layout_is_fixed() {
         let body = frame(0x0102_0304).body();
-        assert_eq!(body[..9], [4, 3, 2, 1, 1, 1, 0, 0, 0]);
+        assert_eq!(body[..9], [4, 3, 2, 1, 0x81, 1, 0, 0, 0]);
         assert_eq!(body[9..13], [0xFE, 0xFF, 0xFF, 0xFF]);
         assert_eq!(body[21..25], [0xFF, 0xFF, 0xFF, 0x7F]);
         assert_eq!(body[41..45], [0, 0, 0, 0x80]);
@@ -343,19 +333,20 @@ mod tests {
         #[test]
         fn every_frame_survives(
             sequence: u32, pose: [i32; 4], position: [i32; 4], velocity: [u32; 4],
-            acceleration: [u32; 4], tick_cost: u32, overruns: u32, state: u8, outputs: u8,
+            acceleration: [u32; 4], tick_cost: u32, overruns: u32, state: u8, outputs: u8, placed: bool,
         ) {
             let sent = SetpointFrame {
                 sequence,
                 setpoint: Setpoint {
                     pose: Pose::from_bits(pose),
                     joints: JointState {
-                        position: position_from_bits(position),
+                        position: JointPosition::from_bits(position),
                         velocity: velocity.map(f32::from_bits),
                         acceleration: acceleration.map(f32::from_bits),
                     },
                     state: state_from_byte(state % 5).unwrap(),
                     outputs,
+                    placed,
                 },
                 tick_cost,
                 overruns,

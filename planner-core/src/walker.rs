@@ -189,6 +189,8 @@ pub struct Walker<'q> {
     point: [i32; AXES],
     rates: Rates,
     held: bool,
+    /// The number of the line under way, or of the last one.
+    line: u32,
 }
 
 impl<'q> Walker<'q> {
@@ -203,7 +205,13 @@ impl<'q> Walker<'q> {
                 rapid: Rate::ONE,
             },
             held: false,
+            line: 0,
         }
+    }
+
+    /// The number of the line under way, or of the last one.
+    pub fn line(&self) -> u32 {
+        self.line
     }
 
     /// Puts the raw point elsewhere, at rest.
@@ -265,6 +273,7 @@ impl<'q> Walker<'q> {
                 Some(way) => {
                     self.walk = Walk::Moving(way);
                     moved |= next.is_some_and(RawSegment::moves);
+                    self.line = next.map_or(self.line, |next| next.line);
                     began = true;
                 }
                 None => stand.time = stand.time.wrapping_add(left),

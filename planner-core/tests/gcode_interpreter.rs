@@ -232,7 +232,6 @@ fn lines_without_motion_change_the_modal_state_only() {
         "G92 X0 Y0",
         "M5 M9 S1000",
         "M6 T1",
-        "M102",
         "M100",
         "M110 N7",
         "N-1 M110 N-1*125",
@@ -553,8 +552,8 @@ fn a_reset_keeps_position_outputs_and_stored_offsets() {
     ]);
     let stored = interpreter.offsets().to_bytes();
     interpreter.reset();
-    // A gripper must not open because a sender was reset.
-    let mut fresh = after(&["M3"]);
+    // A gripper must not open because a sender was reset, and the arm stays as it is.
+    let mut fresh = after(&["M3", "M101"]);
     fresh.reset();
     fresh.set_position(Some(pose(10.0, 20.0, 0.0, 0.0)));
     assert_eq!(interpreter.modal(), fresh.modal());
@@ -587,9 +586,8 @@ fn the_robots_words_change_what_they_name() {
         ),
         ("M100 P1", None),
         ("M100", None),
-        ("M102", None),
+        ("M102", Some(RobotChange::Elbow(Elbow::Right))),
         ("M101", Some(RobotChange::Elbow(Elbow::Left))),
-        ("M101", None),
         ("M102", Some(RobotChange::Elbow(Elbow::Right))),
     ] {
         let command = Command {

@@ -8,6 +8,10 @@
 use core::future::Future;
 
 use embassy_executor::SendSpawner;
+use planner_core::motion::Setpoint;
+use planner_core::pose::JointPosition;
+#[cfg(doc)]
+use planner_core::protocol::Inputs;
 
 #[cfg(feature = "mps2-an386")]
 mod mps2_an386;
@@ -28,7 +32,7 @@ compile_error!("choose one board: `nucleo-g474re` is the default, so add --no-de
 compile_error!("choose a board: feature `nucleo-g474re` or `mps2-an386`");
 
 /// What a board gives the tasks.
-pub struct Board<I, O, S, D, F, W, T> {
+pub struct Board<I, O, S, D, A, F, W, T> {
     /// Commands come in here.
     pub command_in: I,
     /// Answers go out here.
@@ -37,6 +41,8 @@ pub struct Board<I, O, S, D, F, W, T> {
     pub setpoint_out: S,
     /// Drives the gripper and the blow-off.
     pub outputs: D,
+    /// Senses the arm.
+    pub arm: A,
     /// Keeps the settings over power-off, in the board's range `STORE`.
     pub flash: F,
     /// Resets the board when the control task does not keep up.
@@ -66,6 +72,16 @@ pub trait ByteOut {
 pub trait Outputs {
     /// Switches all of them: bit 0 the gripper, bit 1 the blow-off.
     fn set(&mut self, bits: u8);
+}
+
+/// What the board senses of the arm.
+pub trait Arm {
+    /// The inputs, a bit each as in [`Inputs::to_bits`]; 1 is a low level, a switch to ground.
+    fn inputs(&mut self) -> u8;
+    /// What the drives' absolute encoders read, if the board is told.
+    fn encoders(&self) -> Option<JointPosition>;
+    /// The setpoint that goes to the drives in this tick.
+    fn follow(&mut self, setpoint: &Setpoint);
 }
 
 /// The board's watchdog, running since the start.

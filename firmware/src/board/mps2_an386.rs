@@ -26,8 +26,10 @@ use embassy_time::Timer;
 use embassy_time_queue_utils::Queue;
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use heapless::Deque;
+use planner_core::motion::Setpoint;
+use planner_core::pose::{AXES, JointPosition};
 
-use super::{Board, ByteIn, ByteOut, Outputs, Stopwatch, WATCHDOG_MS, Watchdog};
+use super::{Arm, Board, ByteIn, ByteOut, Outputs, Stopwatch, WATCHDOG_MS, Watchdog};
 
 const CORE_HZ: u32 = 25_000_000;
 
@@ -41,8 +43,16 @@ const TIME_PER_SYSTICK: u64 = embassy_time::TICK_HZ / SYSTICK_HZ as u64;
 pub const NAME: &str = "mps2-an386";
 
 /// The emulated board's parts.
-pub type Parts =
-    Board<CommandIn, CommandOut, SetpointOut, BoardOutputs, BoardFlash, BoardWatchdog, Counter>;
+pub type Parts = Board<
+    CommandIn,
+    CommandOut,
+    SetpointOut,
+    BoardOutputs,
+    BoardArm,
+    BoardFlash,
+    BoardWatchdog,
+    Counter,
+>;
 
 /// A memory-mapped register.
 #[derive(Clone, Copy)]
@@ -168,6 +178,7 @@ pub fn start() -> Parts {
         command_out: UartOut(Uart::COMMANDS),
         setpoint_out: UartOut(Uart::SETPOINTS),
         outputs: BoardOutputs(()),
+        arm: BoardArm::at_power_up(),
         flash: BoardFlash::start(),
         watchdog: BoardWatchdog::start(),
         stopwatch: Counter::start(),
@@ -303,6 +314,83 @@ impl BoardOutputs {
 impl Outputs for BoardOutputs {
     fn set(&mut self, bits: u8) {
         Self::LEDS.write(bits.into());
+    }
+}
+
+/// The bench robot's arm, as far as its drives, encoders and limit inputs go: it follows the
+/// setpoints' changes from where it was at power-up, which the controller does not know.
+///
+/// Who says where it is before it has moved is believed, so that a program that begins with its
+/// first point finds the limit inputs where it expects them.
+pub struct BoardArm {
+    joints: [i32; AXES],
+    /// The last setpoint.
+    setpoint: Option<[i32; AXES]>,
+    has_moved: bool,
+}
+
+impl BoardArm {
+    /// 2^-26 rad a degree, 2^-19 mm a millimetre.
+    const DEG: f64 = (1 << 26) as f64 * core::f64::consts::PI / 180.0;
+    const MM: f64 = (1 << 19) as f64;
+
+    /// Where the joints are at power-up: -30°, 60°, 20 mm, 15°.
+    const POWER_UP: [i32; AXES] = [
+        (-30.0 * Self::DEG) as i32,
+        (60.0 * Self::DEG) as i32,
+        (20.0 * Self::MM) as i32,
+        (15.0 * Self::DEG) as i32,
+    ];
+
+    /// Where the limit inputs become active: at -165° and 10°, at 190 mm from below, at -360°.
+    const SWITCHES: [(i32, bool); AXES] = [
+        ((-165.0 * Self::DEG) as i32, false),
+        ((10.0 * Self::DEG) as i32, false),
+        ((190.0 * Self::MM) as i32, true),
+        ((-360.0 * Self::DEG) as i32, false),
+    ];
+
+    const fn at_power_up() -> Self {
+        Self {
+            joints: Self::POWER_UP,
+            setpoint: None,
+            has_moved: false,
+        }
+    }
+}
+
+impl Arm for BoardArm {
+    fn inputs(&mut self) -> u8 {
+        let mut bits = 0;
+        let joints = self.joints.into_iter().zip(Self::SWITCHES).enumerate();
+        for (joint, (position, (switch, is_upper))) in joints {
+            let is_active = if is_upper {
+                position >= switch
+            } else {
+                position <= switch
+            };
+            bits |= u8::from(is_active) << joint;
+        }
+        bits
+    }
+
+    fn encoders(&self) -> Option<JointPosition> {
+        Some(JointPosition::from_bits(self.joints))
+    }
+
+    fn follow(&mut self, setpoint: &Setpoint) {
+        let position = setpoint.joints.position.to_bits();
+        let last = self.setpoint.replace(position).unwrap_or(position);
+        if setpoint.placed {
+            if !self.has_moved {
+                self.joints = position;
+            }
+            return;
+        }
+        for ((joint, to), from) in self.joints.iter_mut().zip(position).zip(last) {
+            self.has_moved |= to != from;
+            *joint = joint.saturating_add(to.wrapping_sub(from));
+        }
     }
 }
 

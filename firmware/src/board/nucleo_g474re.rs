@@ -5,6 +5,7 @@
 //! | commands | LPUART1, PA2 / PA3: the ST-LINK's virtual serial port, 115200 Bd |
 //! | setpoints | USART1 TX on PC4 (Arduino D1), 2 MBd |
 //! | outputs | gripper PA5 (Arduino D13, LED LD2), blow-off PA6 (D12); high is on |
+//! | inputs | limits of joints 1 to 4 on PA0, PA1, PA4, PB0 (A0 to A3), door PC1 (A4); pulled up, a switch to ground is active |
 //! | clock | HSE 24 MHz, PLL ÷ 6 × 85 ÷ 2 |
 #![allow(unsafe_code, reason = "interrupt handlers call their executors")]
 
@@ -14,7 +15,7 @@ use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
 use embassy_executor::InterruptExecutor;
 use embassy_stm32::flash::{self, Blocking, Flash};
-use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::{DMA1_CH1, IWDG, LPUART1};
@@ -25,16 +26,26 @@ use embassy_stm32::{bind_interrupts, dma, rcc};
 use embedded_io_async::{Read, Write};
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use panic_probe as _;
+use planner_core::motion::Setpoint;
+use planner_core::pose::JointPosition;
 use static_cell::ConstStaticCell;
 
-use super::{Board, ByteIn, ByteOut, Outputs, Stopwatch, WATCHDOG_MS, Watchdog};
+use super::{Arm, Board, ByteIn, ByteOut, Outputs, Stopwatch, WATCHDOG_MS, Watchdog};
 
 /// What `$I+` calls it.
 pub const NAME: &str = "nucleo-g474re";
 
 /// The real board's parts.
-pub type Parts =
-    Board<CommandIn, CommandOut, SetpointOut, BoardOutputs, BoardFlash, BoardWatchdog, Counter>;
+pub type Parts = Board<
+    CommandIn,
+    CommandOut,
+    SetpointOut,
+    BoardOutputs,
+    BoardArm,
+    BoardFlash,
+    BoardWatchdog,
+    Counter,
+>;
 
 const COMMAND_BAUD: u32 = 115_200;
 
@@ -114,6 +125,13 @@ pub fn start() -> Parts {
             gripper: Output::new(p.PA5, Level::Low, Speed::Low),
             blow_off: Output::new(p.PA6, Level::Low, Speed::Low),
         },
+        arm: BoardArm([
+            Input::new(p.PA0, Pull::Up),
+            Input::new(p.PA1, Pull::Up),
+            Input::new(p.PA4, Pull::Up),
+            Input::new(p.PB0, Pull::Up),
+            Input::new(p.PC1, Pull::Up),
+        ]),
         flash: BoardFlash(Flash::new_blocking(p.FLASH)),
         watchdog: BoardWatchdog(watchdog),
         stopwatch: Counter::start(),
@@ -195,6 +213,22 @@ impl Outputs for BoardOutputs {
         self.gripper.set_level((bits & 1 != 0).into());
         self.blow_off.set_level((bits & 2 != 0).into());
     }
+}
+
+/// The pins of the inputs: limits of joints 1 to 4, door.
+pub struct BoardArm([Input<'static>; 5]);
+
+impl Arm for BoardArm {
+    fn inputs(&mut self) -> u8 {
+        let low = self.0.iter().map(Input::is_low).enumerate();
+        low.fold(0, |bits, (input, is_low)| bits | u8::from(is_low) << input)
+    }
+
+    fn encoders(&self) -> Option<JointPosition> {
+        None
+    }
+
+    fn follow(&mut self, _: &Setpoint) {}
 }
 
 /// Where the store is: the last pages of the flash. They are in its second bank, so that code

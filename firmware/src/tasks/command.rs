@@ -70,6 +70,7 @@ pub async fn run<F: NorFlash<Error: Debug>>(commands: Commands<impl ByteIn, impl
             }
         }
         link.set_program_open(controller.program_is_open());
+        link.set_inputs_inverted(controller.inputs_inverted());
         if let Ok(count) = with_deadline(wake, input.read(&mut bytes)).await {
             let now_ms = Instant::now().as_millis();
             for &byte in bytes.iter().take(count) {

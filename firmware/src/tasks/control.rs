@@ -16,11 +16,11 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_time::{Duration, Instant, TICK_HZ, Timer};
 use planner_core::motion::Motion;
-use planner_core::protocol::Report;
+use planner_core::protocol::{Inputs, Report};
 use planner_core::telemetry::SetpointFrame;
 use planner_core::units;
 
-use crate::board::{Outputs, Stopwatch, Watchdog};
+use crate::board::{Arm, Outputs, Stopwatch, Watchdog};
 use crate::tasks::link::{Link, Order};
 
 /// Frames between the control task and the setpoint task. The latter runs in the
@@ -44,6 +44,7 @@ pub async fn run(
     link: &'static Link,
     frames: &'static Frames,
     mut outputs: impl Outputs,
+    mut arm: impl Arm,
     stopwatch: impl Stopwatch,
     mut watchdog: impl Watchdog,
 ) -> ! {
@@ -68,10 +69,15 @@ pub async fn run(
             }
         }
 
+        report.inputs = Inputs::from_bits(arm.inputs() ^ link.inputs_inverted());
+        motion.see_limits(report.inputs.limits);
         let start = stopwatch.now();
         let setpoint = motion.tick();
         let tick_cost = stopwatch.since(start);
         outputs.set(setpoint.outputs);
+        arm.follow(&setpoint);
+        report.encoders = arm.encoders();
+        report.progress = motion.progress();
 
         let last = report.setpoint;
         // Not only when everything has stopped: moves that come while the prefilter still

@@ -1,7 +1,7 @@
 //! What passes between the command task and the control task.
 
 use core::cell::Cell;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -28,6 +28,7 @@ pub struct Link {
     robots: Robots,
     report: Mutex<CriticalSectionRawMutex, Cell<Report>>,
     program_open: AtomicBool,
+    inputs_inverted: AtomicU8,
 }
 
 type Orders = Channel<CriticalSectionRawMutex, Order, ORDERS>;
@@ -40,6 +41,7 @@ impl Default for Link {
             robots: Channel::new(),
             report: Mutex::new(Cell::default()),
             program_open: AtomicBool::new(false),
+            inputs_inverted: AtomicU8::new(0),
         }
     }
 }
@@ -63,6 +65,11 @@ impl Link {
         self.program_open.store(open, Ordering::Relaxed);
     }
 
+    /// Command task: inputs that are active while high, a bit each.
+    pub fn set_inputs_inverted(&self, bits: u8) {
+        self.inputs_inverted.store(bits, Ordering::Relaxed);
+    }
+
     /// Command task: the last tick's report.
     pub fn report(&self) -> Report {
         self.report.lock(Cell::get)
@@ -82,6 +89,11 @@ impl Link {
     /// Control task: see [`Link::set_program_open`].
     pub fn program_is_open(&self) -> bool {
         self.program_open.load(Ordering::Relaxed)
+    }
+
+    /// Control task: see [`Link::set_inputs_inverted`].
+    pub fn inputs_inverted(&self) -> u8 {
+        self.inputs_inverted.load(Ordering::Relaxed)
     }
 
     /// Control task: tells about the tick.

@@ -1,6 +1,7 @@
 //! Tests that run the firmware, and the core's cost, on the emulated board.
 
 mod firmware;
+mod homing;
 mod instructions;
 mod link;
 mod same_bits;

@@ -98,6 +98,8 @@ fn fields(setpoint: &Setpoint) -> [(&'static str, u32); 18] {
         joints,
         state,
         outputs,
+        // The two are placed by different means.
+        placed: _,
     } = setpoint;
     let [x, y, z, c] = pose.to_bits().map(i32::cast_unsigned);
     let [v1, v2, v3, v4] = joints.velocity.map(f32::to_bits);

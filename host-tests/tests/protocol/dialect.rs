@@ -6,6 +6,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use crate::homing::bench_arm;
 use host_tests::serial_loop::{Records, SerialLoop, with_controller};
 use planner_core::protocol::{Alarm, ERRORS};
 
@@ -272,7 +273,20 @@ const COMMANDS: &[Row] = &[
         "M100 P1 Q10 R0.01",
         &["ok"],
     ),
-    row("M102", "right elbow", THERE, "M102", &["ok"]),
+    row(
+        "M101",
+        "elbow to the left: the arm passes its stretched pose, the tool comes back",
+        THERE,
+        "M101 @stop",
+        &["ok", "<Idle|MPos:200.000,0.000"],
+    ),
+    row(
+        "M102",
+        "elbow to the right",
+        &[AT, "M101"],
+        "M102 @stop",
+        &["ok", "<Idle|MPos:200.000,0.000"],
+    ),
     row(
         "N… *…",
         "line number and checksum",
@@ -385,7 +399,7 @@ const COMMANDS: &[Row] = &[
     ),
     row(
         "$H",
-        "homes: encoders tell the position",
+        "homes: encoders tell the position, or limit inputs are found",
         &["@encoders", "$1000=1"],
         "$H",
         &["ok"],
@@ -661,7 +675,6 @@ const REFUSALS: &[Row] = &[
     ),
     row("error:76", "", THERE, "M100 P6 Q1", &["error:76"]),
     row("error:77", "", NONE, "$11=-1", &["error:77"]),
-    row("error:79", "", THERE, "M101", &["error:79"]),
     row("error:78", "", NONE, "$frequency=1.5", &["error:78"]),
 ];
 
@@ -691,6 +704,34 @@ const ALARMS: &[Row] = &[
             "[MSG:'$H'|'$X' to unlock]",
             "<Alarm|",
         ],
+    ),
+    row(
+        "ALARM:6",
+        "",
+        &["@switches", "$1004=15", "@begin $H"],
+        "@soft reset",
+        &["ALARM:6", "Grbl 1.1h", "'$H'|'$X' to unlock", "<Alarm|"],
+    ),
+    row(
+        "ALARM:7",
+        "",
+        &["@switches", "$1004=15", "@begin $H"],
+        "@open door",
+        &["error:9", "ALARM:7", "<Alarm|"],
+    ),
+    row(
+        "ALARM:8",
+        "",
+        &["@switches 1", "$1004=15"],
+        "$H @stop",
+        &["ALARM:8", "error:9", "<Alarm|"],
+    ),
+    row(
+        "ALARM:9",
+        "",
+        &["@switches 0", "$1004=15"],
+        "$H @stop",
+        &["ALARM:9", "error:9", "<Alarm|"],
     ),
 ];
 
@@ -770,6 +811,24 @@ fn send(desk: &mut SerialLoop<'_>, item: &str) -> String {
             desk.encoders = Some(desk.joints_at(200.0, 0.0));
             desk.run_ms(2);
             String::new()
+        }
+        ("switches", stuck) => {
+            let mut arm = bench_arm();
+            arm.switches[0].stuck = stuck.parse::<u8>().ok().map(|active| active != 0);
+            desk.arm = Some(arm);
+            String::new()
+        }
+        ("begin", line) => {
+            desk.send(format!("{line}\n").as_bytes());
+            wait(desk, "500")
+        }
+        ("soft", _) => {
+            desk.send(&[0x18]);
+            wait(desk, "2000")
+        }
+        ("open", _) => {
+            desk.inputs.door = true;
+            wait(desk, "2000")
         }
         ("broken", _) => {
             desk.store_works = false;

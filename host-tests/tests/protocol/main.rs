@@ -1,7 +1,9 @@
 //! The serial command protocol, byte by byte, against the unchanged core.
 
 mod dialect;
+mod elbow;
 mod fuzzing;
+mod homing;
 mod noise;
 mod realtime;
 mod records;

@@ -384,3 +384,26 @@ fn a_reset_does_not_make_the_position_known() {
         assert_eq!(desk.state(), "Run", "now it is known, and moves");
     });
 }
+
+#[test]
+fn reports_show_the_line_under_way_if_the_program_numbers_its_lines() {
+    with_robot(|desk| {
+        let report = |desk: &mut SerialLoop<'_>| {
+            desk.heard();
+            desk.send(b"?");
+            desk.heard()
+        };
+        desk.ask("G1 X210 F600");
+        desk.run_ms(300);
+        assert!(!report(desk).contains("Ln:"));
+        assert!(desk.run_until("Idle"));
+        desk.ask("N70 G1 X230 F6000");
+        desk.ask("N80 G1 Y40");
+        desk.run_ms(150);
+        assert!(report(desk).contains("|Ln:70|"));
+        desk.run_ms(400);
+        assert!(report(desk).contains("|Ln:80|"));
+        assert!(desk.run_until("Idle"));
+        assert!(!report(desk).contains("Ln:"));
+    });
+}

@@ -11,9 +11,9 @@ pub const GRIPPER: u8 = 1 << 0;
 /// Output of M7, M8 (on: blow-off) and M9.
 pub const BLOW_OFF: u8 = 1 << 1;
 
-/// Most actions that one line asks for: outputs, a dwell or an intermediate point, a move,
-/// and at the program's end outputs again and the end.
-pub const MAX_ACTIONS_A_LINE: usize = 5;
+/// Most actions that one line asks for: the end of joint moves, outputs, a dwell or an
+/// intermediate point, a move, and at the program's end outputs again and the end.
+pub const MAX_ACTIONS_A_LINE: usize = 6;
 
 /// The actions of one line, in the order in which they are executed: Grbl's.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

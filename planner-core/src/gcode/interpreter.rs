@@ -1,5 +1,6 @@
 //! Lines into commands, by the modal state.
 
+use crate::kinematics::Elbow;
 use crate::pose::Pose;
 
 use super::block::Block;
@@ -130,6 +131,12 @@ impl Interpreter {
         self.offsets = offsets;
     }
 
+    /// Says on which side the elbow is.
+    pub fn set_elbow(&mut self, elbow: Elbow) {
+        self.defaults.elbow = elbow;
+        self.modal.elbow = elbow;
+    }
+
     /// Changes the robot's settings: tolerance, prefilter and elbow are theirs again.
     pub const fn set_defaults(&mut self, defaults: Defaults) {
         self.defaults = defaults;
@@ -140,18 +147,20 @@ impl Interpreter {
 
     /// Back to the state after power-up, as Grbl's soft reset: position, G54 to G59, G28
     /// and G30 stay, G92 and the tool length offset do not. Unlike Grbl's spindle the outputs
-    /// stay too: a reset must not drop what the gripper holds.
+    /// stay too: a reset must not drop what the gripper holds. The elbow is where it is.
     pub const fn reset(&mut self) {
         let Modal {
             position,
             spindle,
             coolant,
+            elbow,
             ..
         } = self.modal;
         self.modal = Modal::new(&self.defaults);
         self.modal.position = position;
         self.modal.spindle = spindle;
         self.modal.coolant = coolant;
+        self.modal.elbow = elbow;
         self.offsets.reset();
     }
 

@@ -1,6 +1,5 @@
 //! The robot's own words, M100 to M102.
 
-use crate::kinematics::Elbow;
 use crate::prefilter::{Kind, PrefilterConfig};
 
 use super::block::Block;
@@ -18,7 +17,10 @@ pub(super) fn robot_command(mut block: Block, code: RobotCode) -> Result<Command
         return Err(Error::OwnLine);
     }
     let robot = match code {
-        RobotCode::Elbow(elbow) => elbow_change(&mut block, elbow),
+        RobotCode::Elbow(elbow) => {
+            block.modal.elbow = elbow;
+            Some(RobotChange::Elbow(elbow))
+        }
         RobotCode::Prefilter => prefilter_change(&mut block)?,
     };
     if let Some(letter) = block.unused() {
@@ -28,11 +30,6 @@ pub(super) fn robot_command(mut block: Block, code: RobotCode) -> Result<Command
         robot,
         ..Command::default()
     })
-}
-
-fn elbow_change(block: &mut Block, elbow: Elbow) -> Option<RobotChange> {
-    let before = core::mem::replace(&mut block.modal.elbow, elbow);
-    (elbow != before).then_some(RobotChange::Elbow(elbow))
 }
 
 /// M100: words that are not given keep their values.

@@ -1,6 +1,7 @@
 //! A SCARA as its maker describes it.
 
 use crate::pose::AXES;
+use crate::units::AngleRad;
 use core::fmt;
 
 /// On which side of the line from shoulder to tool the elbow is, seen from above.
@@ -11,6 +12,26 @@ pub enum Elbow {
     /// Right of it, as of a right arm: joint 2 is positive.
     #[default]
     Right,
+}
+
+impl Elbow {
+    /// The side of an arm whose joint 2 is there.
+    #[must_use]
+    pub fn of(joint2: AngleRad) -> Self {
+        if joint2.is_negative() {
+            Self::Left
+        } else {
+            Self::Right
+        }
+    }
+
+    /// The sign of joint 2.
+    pub(super) const fn sign(self) -> i32 {
+        match self {
+            Self::Left => -1,
+            Self::Right => 1,
+        }
+    }
 }
 
 /// Travel of a joint, ends included: degrees, or millimetres for joint 3.
@@ -29,7 +50,7 @@ pub struct ScaraConfig {
     pub link1_mm: f32,
     /// Forearm, elbow to quill: at least 10 mm. Both links together at most 2000 mm.
     pub link2_mm: f32,
-    /// The arm's side; it never changes in motion.
+    /// The arm's side when its position becomes known.
     pub elbow: Elbow,
     /// Joint 1 and 2: within ±360° and spanning at most 360°. Joint 3: within ±4000 mm.
     /// Joint 4: within ±1080°.

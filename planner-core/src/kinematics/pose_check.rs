@@ -95,13 +95,7 @@ impl Scara {
                 margin_deg: degrees(self.singularity_margin),
             });
         }
-        let positions = [
-            joints.joint1.to_bits(),
-            joints.joint2.to_bits(),
-            joints.joint3.to_bits(),
-            joints.joint4.to_bits(),
-        ];
-        for ((joint, value), (min, max)) in (1..).zip(positions).zip(self.limits) {
+        for ((joint, value), (min, max)) in (1..).zip(joints.to_bits()).zip(self.limits) {
             if value < min || value > max {
                 return Err(self.joint_limit_error(joint, value));
             }

@@ -32,6 +32,9 @@ const PER_Q30: f32 = 1.0 / 1_073_741_824.0;
 /// path stays at 0.5° or more, and any other must not divide by zero.
 const SINE2_MIN: i32 = 1 << 20;
 
+/// How far inside of its range joint 2 is folded: 0.1° in AngleRad.
+const FOLD_SPARE: i32 = 117_127;
+
 /// A validated SCARA in machine units: immutable, shared by the planner and the tick.
 #[derive(Clone, Debug)]
 pub struct Scara {
@@ -102,10 +105,7 @@ impl Scara {
         let (joint1_min, joint1_max) = limits[0];
         let joint1_mid = joint1_min + (joint1_max - joint1_min) / 2;
 
-        let sign = match config.elbow {
-            Elbow::Left => -1.0,
-            Elbow::Right => 1.0,
-        };
+        let sign = config.elbow.sign();
         let scara = Self {
             link1,
             link2,
@@ -114,20 +114,29 @@ impl Scara {
             outer_squared: square(wide1 + wide2),
             cosine_shift,
             cosine_factor: i32::try_from(factor).unwrap_or(i32::MAX),
-            elbow_sign: sign as i32,
+            elbow_sign: sign,
             joint1_turn: (joint1_mid - HALF_TURN, joint1_mid - HALF_TURN + TURN),
             limits,
             singularity_margin: radians(AngleDeg::saturating_from_num(
                 config.singularity_margin_deg,
             )),
             link1_mm: config.link1_mm,
-            per_links_mm2: sign / (config.link1_mm * config.link2_mm),
+            per_links_mm2: sign as f32 / (config.link1_mm * config.link2_mm),
         };
         let (joint2_min, joint2_max) = scara.elbow_range();
         if joint2_min >= joint2_max {
             return Err(ScaraError::ElbowSide);
         }
         Ok(scara)
+    }
+
+    /// Changes the side of the elbow: joint positions are those of that side from now on.
+    pub fn set_elbow(&mut self, elbow: Elbow) {
+        let sign = elbow.sign();
+        if sign != self.elbow_sign {
+            self.elbow_sign = sign;
+            self.per_links_mm2 = -self.per_links_mm2;
+        }
     }
 
     /// Joint positions at a pose: joint 1 within half a turn of the middle of its range, joint 2
@@ -280,6 +289,21 @@ impl Scara {
             z: joints.joint3,
             c: AngleDeg::from_bits(saturate((angle * DEG_PER_RAD_Q31 + (1 << 30)) >> 31)),
         }
+    }
+
+    /// Where the tool is when joint 2 folds, on the elbow's side, as far as the singularity
+    /// margin and its travel ask, and the other joints stay.
+    #[must_use]
+    pub fn folded(&self, joints: &JointPosition) -> Pose {
+        let (min, max) = self.elbow_range();
+        // Inside by a little, so that rounding does not matter.
+        let spare = ((max - min) / 4).min(FOLD_SPARE);
+        let bend = joints.joint2.to_bits().saturating_abs();
+        let bend = bend.clamp(min + spare, (max - spare).max(min + spare));
+        self.forward(&JointPosition {
+            joint2: AngleRad::from_bits(bend.wrapping_mul(self.elbow_sign)),
+            ..*joints
+        })
     }
 
     /// Change of the pose per change of each joint.

@@ -11,11 +11,27 @@ pub enum Alarm {
     SoftLimit,
     /// 3: a reset stopped the motion. The position is kept.
     ResetInMotion,
+    /// 6: a reset stopped homing.
+    HomingReset,
+    /// 7: the safety door was opened while homing.
+    HomingDoor,
+    /// 8: a limit input stayed active while its joint backed off.
+    HomingPullOff,
+    /// 9: a limit input was not found.
+    HomingNotFound,
 }
 
 impl Alarm {
     /// Every alarm, by number.
-    pub const ALL: [Self; 3] = [Self::HardLimit, Self::SoftLimit, Self::ResetInMotion];
+    pub const ALL: [Self; 7] = [
+        Self::HardLimit,
+        Self::SoftLimit,
+        Self::ResetInMotion,
+        Self::HomingReset,
+        Self::HomingDoor,
+        Self::HomingPullOff,
+        Self::HomingNotFound,
+    ];
 
     /// The number in `ALARM:N`, Grbl's.
     #[must_use]
@@ -24,6 +40,10 @@ impl Alarm {
             Self::HardLimit => 1,
             Self::SoftLimit => 2,
             Self::ResetInMotion => 3,
+            Self::HomingReset => 6,
+            Self::HomingDoor => 7,
+            Self::HomingPullOff => 8,
+            Self::HomingNotFound => 9,
         }
     }
 
@@ -41,6 +61,14 @@ impl fmt::Display for Alarm {
             Self::HardLimit => "A limit input became active in motion: free the arm then reset",
             Self::SoftLimit => "A target is out of reach: correct the program then reset",
             Self::ResetInMotion => "A reset stopped the motion: the position is kept; unlock",
+            Self::HomingReset => "A reset stopped homing: the position is unknown; home again or unlock",
+            Self::HomingDoor => "The door was opened while homing: close it and home again or unlock",
+            Self::HomingPullOff => {
+                "A limit input stayed active while its joint backed off: check it and $23 then home again or unlock"
+            }
+            Self::HomingNotFound => {
+                "A limit input was not found: check it and $23 then home again or unlock"
+            }
         })
     }
 }

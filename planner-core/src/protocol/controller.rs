@@ -4,13 +4,15 @@ use heapless::Deque;
 
 use crate::config::{ConfigError, Robot, SettingError};
 use crate::gcode::{Line, LineBuffer, Offsets, Received};
+use crate::joint_space::Space;
 use crate::motion::{MotionState, Order};
 use crate::planner::{LineError, Planner};
-use crate::pose::Pose;
+use crate::pose::{JointPosition, Pose};
 
 use super::alarm::Alarm;
 use super::cycle_start::CycleStart;
 use super::dollar::{Dollar, Restore};
+use super::homing::{self, Homing};
 use super::inbox::Inbox;
 use super::overrides::{Rates, overridden};
 use super::record::{KeptText, RECORD_BYTES, Record};
@@ -29,6 +31,9 @@ const OUTS_AT_ONCE: usize = 6;
 
 /// Outputs that can wait.
 const OUTS: usize = 3 * OUTS_AT_ONCE;
+
+// The longest ways through the controller are kept out of line, so that the texts and lines of
+// one are not on the stack while another is taken.
 
 /// What the shell around the controller has to do next.
 #[derive(Debug)]
@@ -74,6 +79,8 @@ enum Mode {
     Starting,
     Ready,
     Jogging,
+    /// `$H`, by limit inputs.
+    Homing,
     /// `$C`.
     Checking,
     /// Locked until `$X` or `$H`.
@@ -94,7 +101,7 @@ enum Hold {
 /// What happens when a motion that is being stopped for good stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum AfterStop {
-    Reset { in_motion: bool },
+    Reset { alarm: Option<Alarm> },
     Stop,
     JogCancelled,
     Alarm(Alarm),
@@ -156,6 +163,7 @@ pub struct Controller<'q> {
     mode: Mode,
     hold: Hold,
     after_stop: Option<AfterStop>,
+    homing: Homing,
     rates: Rates,
     cadence: Cadence,
     wishes: Wishes,
@@ -203,6 +211,7 @@ impl<'q> Controller<'q> {
             mode: Mode::Starting,
             hold: Hold::None,
             after_stop: None,
+            homing: Homing::new(),
             rates: Rates::FULL,
             cadence: Cadence::new(),
             wishes: Wishes::NONE,
@@ -243,6 +252,12 @@ impl<'q> Controller<'q> {
     #[must_use]
     pub const fn program_is_open(&self) -> bool {
         self.program_open
+    }
+
+    /// Inputs that are active while high: the shell inverts what it reads of them.
+    #[must_use]
+    pub const fn inputs_inverted(&self) -> u8 {
+        self.settings.protocol.inputs_inverted
     }
 
     /// Takes a byte of the link. Realtime commands take effect at once.
@@ -301,6 +316,7 @@ impl<'q> Controller<'q> {
         debug_assert!(pushed.is_ok());
     }
 
+    #[inline(never)]
     fn leave(&mut self, out: Out) -> Step {
         let text = match out {
             Out::Order(order) => {
@@ -337,6 +353,7 @@ impl<'q> Controller<'q> {
         }
     }
 
+    #[inline(never)]
     fn continue_reply(&mut self, report: &Report) -> Option<Text> {
         let reply = self.reply.as_mut()?;
         reply.next(&reply::Known {
@@ -353,7 +370,7 @@ impl<'q> Controller<'q> {
     fn wake_ms(&self, now_ms: u64, report: &Report) -> Option<u64> {
         let waits_for_motion = self.mode == Mode::Starting
             || self.after_stop.is_some()
-            || self.mode == Mode::Jogging
+            || matches!(self.mode, Mode::Jogging | Mode::Homing)
             || self.startup.is_some()
             || (!self.inbox.is_empty() && self.after_stop.is_none())
             || (!self.planner.has_room() && self.cycle_start.is_waiting())
@@ -481,9 +498,16 @@ impl Controller<'_> {
 
     /// Stops and forgets all moves, without alarm and without reset.
     fn stop_for_good(&mut self, report: &Report) {
-        if matches!(self.mode, Mode::Ready | Mode::Jogging) && self.after_stop.is_none() {
-            self.forget_answers();
-            self.stop_motion(AfterStop::Stop, report);
+        if self.after_stop.is_some() {
+            return;
+        }
+        match self.mode {
+            Mode::Ready | Mode::Jogging => {
+                self.forget_answers();
+                self.stop_motion(AfterStop::Stop, report);
+            }
+            Mode::Homing => self.stop_homing(Alarm::HomingReset, report),
+            _ => {}
         }
     }
 
@@ -499,7 +523,11 @@ impl Controller<'_> {
     }
 
     fn soft_reset(&mut self, report: &Report) {
-        let in_motion = !self.is_at_rest(report);
+        let alarm = if self.mode == Mode::Homing {
+            Some(Alarm::HomingReset)
+        } else {
+            (!self.is_at_rest(report)).then_some(Alarm::ResetInMotion)
+        };
         self.forget_answers();
         self.is_refusing = false;
         if self.sequence != Sequence::Off {
@@ -510,7 +538,7 @@ impl Controller<'_> {
             self.rates = Rates::FULL;
             self.wishes.rates = true;
         }
-        self.stop_motion(AfterStop::Reset { in_motion }, report);
+        self.stop_motion(AfterStop::Reset { alarm }, report);
     }
 
     /// Drops the answers under way, but not what was ordered.
@@ -542,8 +570,11 @@ impl Controller<'_> {
                 return false;
             }
             self.after_stop = None;
-            self.stopped(after, report.setpoint.pose);
+            self.stopped(after, report);
             return true;
+        }
+        if self.mode == Mode::Homing {
+            return self.home_on(report);
         }
         if self.mode == Mode::Jogging && self.is_at_rest(report) {
             self.mode = Mode::Ready;
@@ -587,7 +618,7 @@ impl Controller<'_> {
         let protocol = self.settings.protocol;
         if protocol.encoders {
             match report.encoders {
-                Some(joints) => self.place(self.planner.robot().scara.forward(&joints)),
+                Some(joints) => self.place(&joints),
                 None => {
                     self.mode = Mode::Locked;
                     self.out(Out::Message("This board reads no encoders: set $1000=0"));
@@ -600,9 +631,13 @@ impl Controller<'_> {
         true
     }
 
-    /// The tool is here.
-    fn place(&mut self, pose: Pose) {
-        self.planner.stopped_at(pose);
+    /// The joints are here.
+    fn place(&mut self, joints: &JointPosition) {
+        let elbow = self.robot().config.scara.elbow;
+        let pose = self.planner.place_joints(joints);
+        if self.robot().config.scara.elbow != elbow {
+            self.out(Out::Robot);
+        }
         self.out(Out::Order(Order::Place(pose)));
     }
 
@@ -616,23 +651,29 @@ impl Controller<'_> {
     }
 
     /// The motion that was stopped for good stands.
-    fn stopped(&mut self, after: AfterStop, pose: Pose) {
+    fn stopped(&mut self, after: AfterStop, report: &Report) {
         // Who did not know where the robot is does not know it now.
         if self.target().is_some() {
-            self.planner.stopped_at(pose);
+            match report.progress.space {
+                Space::Tool => self.planner.stopped_at(report.setpoint.pose),
+                Space::Joints => {
+                    let joints = report.setpoint.joints.position;
+                    self.planner.stopped_at_joints(joints);
+                }
+            }
         }
         match after {
-            AfterStop::Reset { in_motion } => {
+            AfterStop::Reset { alarm } => {
                 self.planner.reset_modes();
                 self.forget_robot_words();
                 let was_locked = matches!(self.mode, Mode::Locked | Mode::Critical | Mode::Asleep);
-                self.mode = if in_motion || was_locked {
+                self.mode = if alarm.is_some() || was_locked {
                     Mode::Locked
                 } else {
                     Mode::Ready
                 };
-                if in_motion {
-                    self.out(Out::Alarm(Alarm::ResetInMotion));
+                if let Some(alarm) = alarm {
+                    self.out(Out::Alarm(alarm));
                 }
                 self.greet();
             }
@@ -655,9 +696,11 @@ impl Controller<'_> {
         }
     }
 
-    /// Takes back what M100 has changed, as a reset does with all modes.
+    /// Takes back what M100 has changed, as a reset does with all modes. What M101 and M102
+    /// have changed stays as it is, because the arm does.
+    #[inline(never)]
     fn forget_robot_words(&mut self) {
-        if self.planner.robot().config == self.settings.robot {
+        if self.robot().config.prefilter == self.settings.robot.prefilter {
             return;
         }
         // A robot has been made of these settings before.
@@ -688,6 +731,7 @@ impl Controller<'_> {
             (Mode::Locked | Mode::Critical, _) => State::Alarm,
             (Mode::Checking, _) => State::Check,
             (Mode::Jogging, _) => State::Jog,
+            (Mode::Homing, _) => State::Home,
             (_, Hold::Door) => State::Door {
                 stopping,
                 open: report.inputs.door,
@@ -700,6 +744,7 @@ impl Controller<'_> {
         }
     }
 
+    #[inline(never)]
     fn status(&mut self, report: &Report) -> Text {
         let full = core::mem::take(&mut self.wishes.full_status);
         let state = self.state(report);
@@ -715,7 +760,8 @@ impl Controller<'_> {
                 machine_position: protocol.report_mask & 1 != 0,
                 inches: protocol.report_inches,
                 buffers: has_buffers.then(|| (self.planner.free_places(), self.inbox.free_bytes())),
-                line: None,
+                line: (self.has_line_numbers && state != State::Idle)
+                    .then_some(report.progress.line),
                 speed_mm_s: report.speed_mm_s(),
                 inputs: report.inputs,
                 outputs: report.setpoint.outputs,
@@ -732,7 +778,10 @@ impl Controller<'_> {
 impl Controller<'_> {
     /// Takes the next line, if it may be answered now.
     fn take_line(&mut self, report: &Report) -> bool {
-        if matches!(self.mode, Mode::Starting | Mode::Critical | Mode::Asleep) {
+        if matches!(
+            self.mode,
+            Mode::Starting | Mode::Homing | Mode::Critical | Mode::Asleep
+        ) {
             return false;
         }
         let Some(first) = self.inbox.first_byte() else {
@@ -785,6 +834,7 @@ impl Controller<'_> {
         }
     }
 
+    #[inline(never)]
     fn gcode(&mut self, text: &[u8], report: &Report) {
         if matches!(self.mode, Mode::Locked | Mode::Jogging) {
             return self.refuse(Refusal::Locked);
@@ -884,6 +934,7 @@ impl Controller<'_> {
     }
 
     /// Executes the next start-up line, if one is due.
+    #[inline(never)]
     fn run_startup(&mut self, report: &Report) -> bool {
         let Some(line) = self.startup else {
             return false;
@@ -909,6 +960,7 @@ impl Controller<'_> {
 
 // `$` commands.
 impl Controller<'_> {
+    #[inline(never)]
     fn dollar(&mut self, command: &[u8], report: &Report) {
         let command = core::str::from_utf8(command).ok().and_then(Dollar::parse);
         let Some(command) = command else {
@@ -996,7 +1048,7 @@ impl Controller<'_> {
                 self.out(Out::Message("Disabled"));
                 self.accept();
                 self.after_stop = Some(AfterStop::Reset {
-                    in_motion: !self.is_at_rest(report),
+                    alarm: (!self.is_at_rest(report)).then_some(Alarm::ResetInMotion),
                 });
             }
             Mode::Ready => {
@@ -1103,16 +1155,72 @@ impl Controller<'_> {
         self.accept();
     }
 
-    /// Encoders tell the position at once.
+    /// Encoders tell the position at once, limit inputs have to be found.
     fn home(&mut self, report: &Report) {
         if self.settings.protocol.encoders
             && let Some(joints) = report.encoders
         {
-            self.place(self.planner.robot().scara.forward(&joints));
-            self.mode = Mode::Ready;
-            return self.accept();
+            return self.homed(&joints);
         }
-        self.refuse(Refusal::NoHoming);
+        if self.settings.homing.joints == 0 {
+            return self.refuse(Refusal::NoHoming);
+        }
+        self.mode = Mode::Homing;
+        self.homing = Homing::new();
+        self.hold = Hold::None;
+        self.planner.forget_position();
+    }
+
+    /// The joints are known; what comes at every start comes now.
+    fn homed(&mut self, joints: &JointPosition) {
+        self.mode = Mode::Ready;
+        self.place(joints);
+        self.accept();
+        self.startup = Some(0);
+    }
+
+    /// Ends homing without a position, by an alarm when everything stands.
+    fn stop_homing(&mut self, alarm: Alarm, report: &Report) {
+        self.stop_motion(AfterStop::Alarm(alarm), report);
+        self.out(Out::Error(Refusal::Locked.code()));
+    }
+
+    /// Goes on with homing, once the last move has ended; whether it has.
+    #[inline(never)]
+    fn home_on(&mut self, report: &Report) -> bool {
+        if report.inputs.door {
+            self.stop_homing(Alarm::HomingDoor, report);
+            return true;
+        }
+        if !self.has_stopped(report) {
+            return false;
+        }
+        let outcome = homing::Outcome {
+            joints: report.setpoint.joints.position,
+            touched: report.progress.touched,
+            limits: report.inputs.limits,
+        };
+        let travels = (self.robot().config.scara.joint_limits).map(|range| range.max - range.min);
+        match self.homing.next(&self.settings.homing, &travels, &outcome) {
+            homing::Next::Move {
+                to,
+                duration_s,
+                until,
+            } => {
+                self.planner.move_joints(outcome.joints, to, duration_s);
+                self.out(Out::Order(match until {
+                    Some((joint, active)) => Order::Seek { joint, active },
+                    None => Order::Start,
+                }));
+            }
+            homing::Next::Done(joints) => self.homed(&joints),
+            homing::Next::Failed(alarm) => {
+                self.mode = Mode::Locked;
+                self.out(Out::Alarm(alarm));
+                self.out(Out::Error(Refusal::Locked.code()));
+            }
+        }
+        true
     }
 }
 

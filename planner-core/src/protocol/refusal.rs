@@ -7,7 +7,7 @@ use core::fmt;
 pub enum Refusal {
     /// 3: no `$` command of that name, or one that is not complete.
     BadDollar,
-    /// 5: homing, without encoders that tell the position.
+    /// 5: homing, without encoders or limit inputs that tell the position.
     NoHoming,
     /// 7: the settings could not be kept, and are those of the start again after a restart.
     NotStored,
@@ -59,14 +59,14 @@ impl fmt::Display for Refusal {
 }
 
 /// What each `error:N` means, as `$EE` lists it.
-pub const ERRORS: [(u8, &str); 50] = [
+pub const ERRORS: [(u8, &str); 49] = [
     (1, "A word begins with something other than a letter"),
     (2, "A letter has no proper number"),
     (3, "There is no such $ command or setting: see $ and $$"),
     (4, "A value is negative that must not be"),
     (
         5,
-        "There are no encoders to home by: set $1000=1 if the drives have them",
+        "There is nothing to home by: set $1000 for encoders or $1004 for limit inputs",
     ),
     (
         7,
@@ -148,7 +148,6 @@ pub const ERRORS: [(u8, &str); 50] = [
         78,
         "The settings do not make a robot: see the message before",
     ),
-    (79, "The elbow cannot change its side inside a program"),
 ];
 
 /// The sentence for an `error:N`.

@@ -2,7 +2,7 @@
 
 use micromath::F32Ext;
 
-use crate::motion::Setpoint;
+use crate::motion::{Progress, Setpoint};
 use crate::pose::{JointPosition, Pose};
 use crate::units::TICK_HZ;
 
@@ -15,6 +15,26 @@ pub struct Inputs {
     pub door: bool,
 }
 
+impl Inputs {
+    /// The safety door among the bits.
+    const DOOR: u8 = 1 << 4;
+
+    /// From a bit each: joints 1 to 4 from bit 0, the door bit 4.
+    #[must_use]
+    pub const fn from_bits(bits: u8) -> Self {
+        Self {
+            limits: bits & 0b1111,
+            door: bits & Self::DOOR != 0,
+        }
+    }
+
+    /// The inverse of [`Inputs::from_bits`].
+    #[must_use]
+    pub const fn to_bits(self) -> u8 {
+        self.limits & 0b1111 | if self.door { Self::DOOR } else { 0 }
+    }
+}
+
 /// What the last tick was like.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Report {
@@ -22,6 +42,8 @@ pub struct Report {
     pub setpoint: Setpoint,
     /// Where the tool was a tick before, for its speed.
     pub previous_pose: Pose,
+    /// How far the motion has come.
+    pub progress: Progress,
     /// Orders obeyed since the start.
     pub orders: u32,
     /// The board's inputs.

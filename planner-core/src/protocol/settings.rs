@@ -5,6 +5,9 @@
 
 use core::fmt;
 
+use super::homing::HomingConfig;
+#[cfg(doc)]
+use super::report::Inputs;
 use crate::config::{RobotConfig, SettingError, SettingValue};
 use crate::prefilter::Kind as Prefilter;
 
@@ -20,6 +23,9 @@ pub struct ProtocolConfig {
     /// A target that the robot cannot reach is not only refused: it raises alarm 2, as in
     /// Grbl, so that a sender that ignores errors does not go on from elsewhere.
     pub soft_limit_alarm: bool,
+    /// Inputs that are active while high, as [`Inputs::to_bits`] has them: switches that open,
+    /// so that a broken wire is an open door.
+    pub inputs_inverted: u8,
     /// A limit input that becomes active in motion raises alarm 1.
     pub hard_limits: bool,
     /// The controller is locked at the start, until `$H` or `$X`.
@@ -39,6 +45,7 @@ impl Default for ProtocolConfig {
             report_inches: false,
             report_joints: false,
             soft_limit_alarm: false,
+            inputs_inverted: 0,
             hard_limits: false,
             start_locked: false,
             encoders: false,
@@ -55,6 +62,8 @@ pub struct Settings {
     pub robot: RobotConfig,
     /// The controller's manners.
     pub protocol: ProtocolConfig,
+    /// How the joints find their limit inputs.
+    pub homing: HomingConfig,
 }
 
 /// A setting's kind of value, with what is needed to check and to describe it.
@@ -93,13 +102,14 @@ pub struct Setting {
 }
 
 /// Names of the groups of settings.
-pub const GROUPS: [&str; 5] = ["Reports", "Safety", "Link", "Robot", "Motion"];
+pub const GROUPS: [&str; 6] = ["Reports", "Safety", "Link", "Robot", "Motion", "Homing"];
 
 const REPORTS: u8 = 0;
 const SAFETY: u8 = 1;
 const LINK: u8 = 2;
 const ROBOT: u8 = 3;
 const MOTION: u8 = 4;
+const HOMING: u8 = 5;
 
 const fn setting(
     number: u16,
@@ -123,6 +133,8 @@ const fn decimal(low: f32, high: f32) -> Kind {
     Kind::Decimal { low, high }
 }
 
+const JOINTS: &[&str] = &["Joint 1", "Joint 2", "Joint 3", "Joint 4"];
+const INPUTS: &[&str] = &["Joint 1", "Joint 2", "Joint 3", "Joint 4", "Door"];
 const ELBOWS: &[&str] = &["left", "right"];
 const PREFILTERS: &[&str] = &{
     let mut names = [""; Prefilter::ALL.len()];
@@ -135,7 +147,15 @@ const PREFILTERS: &[&str] = &{
 };
 
 /// The table, by number.
-pub const SETTINGS: [Setting; 28] = [
+pub const SETTINGS: [Setting; 39] = [
+    setting(
+        5,
+        "inputs-inverted",
+        SAFETY,
+        "Inputs active while high",
+        "",
+        Kind::Bits(INPUTS),
+    ),
     setting(
         10,
         "report",
@@ -185,6 +205,38 @@ pub const SETTINGS: [Setting; 28] = [
         Kind::Switch,
     ),
     setting(
+        23,
+        "home-lower-end",
+        HOMING,
+        "Limit input at the lower end",
+        "",
+        Kind::Bits(JOINTS),
+    ),
+    setting(
+        24,
+        "home-slow",
+        HOMING,
+        "Speed of locating",
+        "deg/s or mm/s",
+        decimal(0.01, 1000.0),
+    ),
+    setting(
+        25,
+        "home-fast",
+        HOMING,
+        "Speed of seeking",
+        "deg/s or mm/s",
+        decimal(0.01, 1000.0),
+    ),
+    setting(
+        27,
+        "home-pull-off",
+        HOMING,
+        "Distance from the limit input",
+        "deg or mm",
+        decimal(0.01, 90.0),
+    ),
+    setting(
         1000,
         "encoders",
         SAFETY,
@@ -215,6 +267,14 @@ pub const SETTINGS: [Setting; 28] = [
         "Report joint positions",
         "",
         Kind::Switch,
+    ),
+    setting(
+        1004,
+        "home-joints",
+        HOMING,
+        "Joints with a limit input",
+        "",
+        Kind::Bits(JOINTS),
     ),
     setting(
         1010,
@@ -299,6 +359,38 @@ pub const SETTINGS: [Setting; 28] = [
         decimal(-1080.0, 1080.0),
     ),
     setting(
+        1031,
+        "home1",
+        HOMING,
+        "Joint 1 at its limit input",
+        "deg",
+        decimal(-360.0, 360.0),
+    ),
+    setting(
+        1032,
+        "home2",
+        HOMING,
+        "Joint 2 at its limit input",
+        "deg",
+        decimal(-360.0, 360.0),
+    ),
+    setting(
+        1033,
+        "home3",
+        HOMING,
+        "Joint 3 at its limit input",
+        "mm",
+        decimal(-4000.0, 4000.0),
+    ),
+    setting(
+        1034,
+        "home4",
+        HOMING,
+        "Joint 4 at its limit input",
+        "deg",
+        decimal(-1080.0, 1080.0),
+    ),
+    setting(
         1040,
         "prefilter",
         MOTION,
@@ -343,6 +435,14 @@ pub const SETTINGS: [Setting; 28] = [
         "yaw-limit",
         MOTION,
         "Fastest yaw",
+        "deg/s",
+        decimal(0.001, 10_000.0),
+    ),
+    setting(
+        1053,
+        "joint-speed",
+        MOTION,
+        "Joints while the elbow changes",
         "deg/s",
         decimal(0.001, 10_000.0),
     ),
@@ -511,16 +611,28 @@ impl Settings {
 
     fn place(&mut self, name: &str) -> Place<'_> {
         let protocol = &mut self.protocol;
+        let homing = &mut self.homing;
+        let [home1, home2, home3, home4] = &mut homing.positions;
         match name {
             "report" => Place::Bits(&mut protocol.report_mask),
             "report-inches" => Place::Switch(&mut protocol.report_inches),
             "report-joints" => Place::Switch(&mut protocol.report_joints),
             "soft-limit-alarm" => Place::Switch(&mut protocol.soft_limit_alarm),
+            "inputs-inverted" => Place::Bits(&mut protocol.inputs_inverted),
             "hard-limits" => Place::Switch(&mut protocol.hard_limits),
             "start-locked" => Place::Switch(&mut protocol.start_locked),
             "encoders" => Place::Switch(&mut protocol.encoders),
             "error-safe" => Place::Switch(&mut protocol.error_safe),
             "link-timeout" => Place::Number(&mut protocol.link_timeout_s),
+            "home-joints" => Place::Bits(&mut homing.joints),
+            "home-lower-end" => Place::Bits(&mut homing.at_lower_end),
+            "home-slow" => Place::Number(&mut homing.slow),
+            "home-fast" => Place::Number(&mut homing.fast),
+            "home-pull-off" => Place::Number(&mut homing.pull_off),
+            "home1" => Place::Number(home1),
+            "home2" => Place::Number(home2),
+            "home3" => Place::Number(home3),
+            "home4" => Place::Number(home4),
             _ => Place::Robot,
         }
     }
@@ -611,7 +723,14 @@ mod tests {
                 continue;
             };
             // What must fit something else has its range for the help only.
-            let is_plain = ["tolerance", "rapid", "feed-limit", "yaw-limit", "damping"];
+            let is_plain = [
+                "tolerance",
+                "rapid",
+                "feed-limit",
+                "yaw-limit",
+                "joint-speed",
+                "damping",
+            ];
             if !is_plain.contains(&setting.name) {
                 continue;
             }
