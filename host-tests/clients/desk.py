@@ -16,7 +16,7 @@ FEED = 600
 
 
 def program(length_mm):
-    """1000 lines from X250 Y0 along X and back, so many mm."""
+    """1000 lines from X250 Y0, so many mm along X and back again but for the last two steps."""
     step = length_mm / 499
     there = [f"G1 X{250 + step * n:.3f} F{FEED}" for n in range(500)]
     return ["G90", "G0 X250 Y0"] + there + there[::-1][:498]

@@ -136,7 +136,7 @@ async function main() {
   const all = sender.total === 1001 && sender.received === 1001;
   check('stream 1000 lines', finished && all && lines.length === 1000, sender);
   await isIn('Idle');
-  await checkView('after the program', [250.04, 0, 0]);
+  await checkView('after the program', [250.08, 0, 0]);
 
   await stream('long', LONG);
   await sleep(3000);

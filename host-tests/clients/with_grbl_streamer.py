@@ -53,7 +53,7 @@ run(lines)
 finished = wait_for(lambda: "on_job_completed" in events, 60)
 processed = events.count("on_processed_command")
 check("stream 1000 lines", finished and processed == 1000 and not errors, (processed, errors))
-check_view("after the program", *stands(), expected=[250.04, 0, 0])
+check_view("after the program", *stands(), expected=[250.08, 0, 0])
 
 run(LONG)
 time.sleep(3)

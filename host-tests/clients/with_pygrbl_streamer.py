@@ -29,7 +29,7 @@ check("connect", streamer.state == State.IDLE and banners, streamer.state)
 
 lines = program(20)
 check("stream 1000 lines", len(lines) == 1000 and streamer.stream(lines, total=1000), errors)
-check_view("after the program", *view(), expected=[250.04, 0, 0, 0])
+check_view("after the program", *view(), expected=[250.08, 0, 0, 0])
 
 result = []
 job = threading.Thread(target=lambda: result.append(streamer.stream(LONG, total=len(LONG))))

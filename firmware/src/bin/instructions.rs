@@ -15,6 +15,7 @@ use planner_core::gcode::{Defaults, Interpreter, Line};
 use planner_core::motion::{DelayLines, Motion, MotionState, Order};
 use planner_core::planner::Planner;
 use planner_core::prefilter::{Kind, PrefilterConfig};
+use planner_core::protocol::{Controller, Identity, Report, Settings, Step};
 use planner_core::queue::SegmentQueue;
 use static_cell::ConstStaticCell;
 
@@ -75,6 +76,10 @@ fn main() -> ! {
             bench.print(format_args!("tick/{program}/at-{percent}"), worst.tick);
         }
     }
+    let (_, half_millimetres) = PROGRAMS[2];
+    let served = bench.serve(&robot(Kind::FirZvd, 6.34), half_millimetres, filters);
+    bench.print(format_args!("link/line"), served.line_mean);
+    bench.print(format_args!("link/status"), served.status);
     for kind in Kind::ALL {
         let worst = bench.corners(&robot(kind, 6.34));
         bench.print(format_args!("corner/{}", kind.name()), worst);
@@ -99,6 +104,15 @@ fn robot(kind: Kind, frequency_hz: f32) -> Robot {
 struct Worst {
     tick: u32,
     line: u32,
+}
+
+/// What a link costs, in instructions.
+#[derive(Default)]
+struct Served {
+    /// From a line's bytes to its `ok`, its way through the planner included: the mean.
+    line_mean: u32,
+    /// From a `?` to the report: the dearest.
+    status: u32,
 }
 
 struct Bench {
@@ -165,6 +179,63 @@ impl Bench {
                 return worst;
             }
         }
+    }
+
+    /// Sends a program byte by byte through the controller, and asks for the status now and
+    /// then.
+    fn serve(&self, robot: &Robot, program: &str, filters: &mut DelayLines) -> Served {
+        let mut queue = SegmentQueue::new();
+        let (producer, consumer) = queue.split();
+        let identity = Identity {
+            board: "",
+            cost_unit: "",
+            blocks: 0,
+            stack_use: || (0, 0),
+        };
+        let planner = Planner::new(robot, producer);
+        let mut controller = Controller::new(planner, Settings::default(), identity);
+        let mut motion = Motion::new(robot, consumer, filters);
+        let mut report = Report::default();
+        let mut served = Served::default();
+        let (mut total, mut lines, mut now_ms) = (0, 0, 0);
+        for line in program.lines() {
+            total += self.count(|| {
+                let bytes = black_box(line).bytes().chain([b'\n']);
+                bytes.for_each(|byte| controller.receive(byte, now_ms));
+            });
+            let mut is_answered = false;
+            while !is_answered {
+                let mut step = Step::Wait(None);
+                let cost = self.count(|| step = controller.step(now_ms, &report));
+                // Waiting for room takes no time from anything.
+                if !matches!(step, Step::Wait(_)) {
+                    total += cost;
+                }
+                match step {
+                    Step::Say(text) => is_answered = text.as_bytes().starts_with(b"ok"),
+                    Step::Order(order) => {
+                        motion.obey(order);
+                        report.orders = report.orders.wrapping_add(1);
+                    }
+                    Step::Wait(_) => {
+                        now_ms += 1;
+                        report.setpoint = motion.tick();
+                        report.health.ticks += 1;
+                    }
+                    Step::Robot | Step::Keep(_) | Step::ForgetRecords => {}
+                }
+            }
+            lines += 1;
+            let mut step = Step::Wait(None);
+            let cost = self.count(|| {
+                controller.receive(black_box(b'?'), now_ms);
+                step = controller.step(now_ms, &report);
+            });
+            defmt::assert!(matches!(step, Step::Say(_)), "a report");
+            served.status = served.status.max(cost);
+        }
+        served.line_mean = total / lines;
+        served
     }
 
     /// From the text of a line to its command, without the planner.

@@ -72,10 +72,25 @@ fn a_line_is_read_below_6000_instructions() {
     assert!(counts["gcode/arc"] <= 20_000, "{counts:?}");
 }
 
+/// 170 MHz, up to 1.5 cycles an instruction.
+const INSTRUCTIONS_S: u64 = 113_000_000;
+
+#[test]
+fn a_link_carries_a_thousand_lines_a_second_beside_the_tick_and_the_status() {
+    let Some(counts) = counts() else { return };
+    let ticks = 1000 * counts["tick/half-millimetres/fir-zvd"];
+    let reports = 10 * counts["link/status"];
+    let line = counts["link/line"];
+    let lines_s = (INSTRUCTIONS_S - ticks - reports) / line;
+    println!("{lines_s} lines a second, {line} instructions each, ten reports {reports}");
+    assert!(lines_s >= 1000, "{lines_s}");
+    assert!((5000..=100_000).contains(&line), "{line}");
+    // Ten reports a second take less than a thousandth of the time.
+    assert!(reports * 100 <= INSTRUCTIONS_S, "{reports}");
+}
+
 #[test]
 fn lines_are_planned_at_a_thousand_a_second() {
-    // 170 MHz, up to 1.5 cycles an instruction
-    const INSTRUCTIONS_S: u64 = 113_000_000;
     let Some(counts) = counts() else { return };
     for (name, count) in counts {
         if name.starts_with("line/") {
