@@ -398,7 +398,7 @@ impl Arm for BoardArm {
 pub const STORE: Range<u32> = 0..BoardFlash::BYTES as u32;
 
 /// A flash memory with 8-byte words and 2 KiB pages, as in the real board, simulated in the
-/// machine's PSRAM: it outlasts a reset, and not the emulator.
+/// machine's PSRAM: it outlasts a reset, and the emulator if that keeps the PSRAM in a file.
 pub struct BoardFlash(());
 
 impl BoardFlash {

@@ -46,6 +46,10 @@ pub struct EmulateArgs {
     /// Robot file (TOML) whose settings the controller gets; its own if there is none.
     #[arg(long, value_name = "FILE")]
     robot: Option<PathBuf>,
+    /// File that the controller's flash is kept in, made if there is none (16 MiB, mostly
+    /// empty): settings and offsets outlast the emulator. Without it they outlast a reset.
+    #[arg(long, value_name = "FILE")]
+    flash: Option<PathBuf>,
     /// A second of the controller takes a second, as on a real board. This is the default.
     #[arg(long, conflicts_with = "fast")]
     real_time: bool,
@@ -80,7 +84,7 @@ pub fn execute(args: &EmulateArgs) -> Result<String> {
     } else {
         Pace::RealTime
     };
-    let mut board = EmulatedBoard::boot(image, pace, &lines)?;
+    let mut board = EmulatedBoard::boot(image, pace, args.flash.as_deref(), &lines)?;
     let mut bridge = Bridge::new(Ends {
         commands: board.commands.try_clone()?,
         setpoints: board.setpoints.try_clone()?,

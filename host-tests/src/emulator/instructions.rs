@@ -14,7 +14,7 @@ const LINE_S: u64 = 60;
 /// Runs the image that measures pieces of code, and yields the instructions of each
 /// by its name. A count may be one off; the same image counts the same every time.
 pub fn measure_instructions(image: &Path) -> Result<BTreeMap<String, u64>, EmulatorError> {
-    let (mut qemu, [port]) = Qemu::boot(image, Pace::Free)?;
+    let (mut qemu, [port]) = Qemu::boot(image, Pace::Free, None)?;
     port.set_read_timeout(Some(Duration::from_secs(LINE_S)))?;
     let mut counts = BTreeMap::new();
     for line in BufReader::new(port).lines() {

@@ -23,8 +23,14 @@ pub struct EmulatedBoard {
 
 impl EmulatedBoard {
     /// Boots `image`, waits for its banner, and sends settings (`name=value`), a line each.
-    pub fn boot(image: &Path, pace: Pace, settings: &[String]) -> Result<Self, EmulatorError> {
-        let (qemu, [mut commands, setpoints]) = Qemu::boot(image, pace)?;
+    /// A file for the flash keeps what the board keeps.
+    pub fn boot(
+        image: &Path,
+        pace: Pace,
+        flash: Option<&Path>,
+        settings: &[String],
+    ) -> Result<Self, EmulatorError> {
+        let (qemu, [mut commands, setpoints]) = Qemu::boot(image, pace, flash)?;
         commands.set_read_timeout(Some(Duration::from_secs(ANSWER_S)))?;
         // Nothing is said unasked, so the reader holds nothing back when it is dropped.
         let mut reader = BufReader::new(commands.try_clone()?);

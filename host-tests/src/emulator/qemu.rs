@@ -40,6 +40,9 @@ impl Pace {
 
 const PROGRAM: &str = "qemu-system-arm";
 
+/// The board's PSRAM, in whose first bytes the flash is simulated.
+const PSRAM_BYTES: u32 = 16 << 20;
+
 /// QEMU connects within milliseconds, on a loaded machine within seconds.
 const START_S: u64 = 30;
 
@@ -69,16 +72,30 @@ impl Qemu {
     /// QEMU is the client: it connects to listeners that are already open, on ports
     /// that the system chose, and does so before the core's first instruction. So
     /// no port can be taken by another, and no byte is sent to nobody.
+    ///
+    /// With a file for the flash, what the board keeps outlasts the emulator: the memory that
+    /// the flash is simulated in is the file's, from its first byte on.
     pub fn boot<const PORTS: usize>(
         image: &Path,
         pace: Pace,
+        flash: Option<&Path>,
     ) -> Result<(Self, [TcpStream; PORTS]), EmulatorError> {
         if !image.is_file() {
             return Err(EmulatorError::NoImage(image.to_path_buf()));
         }
         let mut command = Command::new(PROGRAM);
+        let mut machine = "mps2-an386".to_owned();
+        if let Some(flash) = flash {
+            let path = std::path::absolute(flash)?.display().to_string();
+            // In QEMU's options a comma is written twice.
+            let path = path.replace(',', ",,");
+            command.arg("-object").arg(format!(
+                "memory-backend-file,id=flash,size={PSRAM_BYTES},share=on,mem-path={path}"
+            ));
+            machine += ",memory-backend=flash";
+        }
         command
-            .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
+            .args(["-M", &machine, "-display", "none", "-monitor", "none"])
             .args(["-icount", pace.icount(), "-kernel"])
             .arg(image);
         let mut listeners = Vec::new();

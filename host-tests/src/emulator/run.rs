@@ -81,7 +81,7 @@ impl Emulator {
 
     /// Boots `image` and waits for its banner.
     pub fn start_at(image: &Path, pace: Pace) -> Result<Self, EmulatorError> {
-        let (qemu, [commands, setpoints]) = Qemu::boot(image, pace)?;
+        let (qemu, [commands, setpoints]) = Qemu::boot(image, pace, None)?;
         let mut emulator = Self {
             setpoints: SetpointPort::new(setpoints, commands.try_clone()?),
             commands: CommandPort::new(commands)?,

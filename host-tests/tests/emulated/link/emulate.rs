@@ -104,3 +104,39 @@ fn a_robot_file_reaches_the_controller() {
     let said = emulator.client().ask("$tolerance");
     assert!(said[0].ends_with("=0.125"), "{said:?}");
 }
+
+/// The firmware's own store on the simulated flash: over a reset of the emulator, over one that
+/// was killed, and after the flash was damaged.
+#[test]
+fn settings_outlast_the_emulator_in_a_file() {
+    let here = TempDir::new().unwrap();
+    let flash = here.path().join("flash, of the bench");
+    let args = ["--flash", flash.to_str().unwrap()];
+    let Some(mut emulator) = Emulator::start(&args) else {
+        return;
+    };
+    let mut client = emulator.client();
+    assert_eq!(client.ask("$tolerance=0.375 link-timeout=2"), ["ok"]);
+    assert_eq!(client.ask("G10 L2 P2 X12.5"), ["ok"]);
+    signal(&emulator.child, Signal::KILL);
+    end_of(&mut emulator.child);
+
+    let emulator = Emulator::start(&args).unwrap();
+    let mut client = emulator.client();
+    assert_eq!(client.ask("$tolerance"), ["$11=0.375", "ok"]);
+    assert_eq!(client.ask("$link-timeout"), ["$1002=2", "ok"]);
+    let offsets = client.ask("$#");
+    assert!(
+        offsets.iter().any(|line| line.starts_with("[G55:12.500,")),
+        "{offsets:?}"
+    );
+    drop(emulator);
+
+    // Every bit of the first page is programmed.
+    let file = fs::OpenOptions::new().write(true).open(&flash).unwrap();
+    std::os::unix::fs::FileExt::write_all_at(&file, &[0; 8192], 0).unwrap();
+    let emulator = Emulator::start(&args).unwrap();
+    let mut client = emulator.client();
+    assert_eq!(client.ask("$tolerance"), ["$11=0.5", "ok"]);
+    assert_eq!(client.ask("$tolerance=0.25"), ["ok"]);
+}
