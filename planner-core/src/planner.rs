@@ -359,7 +359,7 @@ impl<'q> Planner<'q> {
             let position = self.interpreter.modal().position();
             queued |= self
                 .schedule
-                .to_tool(position, self.robot.config.scara.elbow);
+                .return_to_tool(position, self.robot.config.scara.elbow);
         }
         if let Some(outputs) = command.outputs {
             queued |= self.schedule.switch(outputs);
@@ -406,9 +406,11 @@ impl<'q> Planner<'q> {
                 self.joints = None;
                 self.schedule
                     .move_joints(change.from, change.to, change.duration_s)
-                    && self.schedule.to_tool(Some(change.pose), change.elbow)
+                    && self
+                        .schedule
+                        .return_to_tool(Some(change.pose), change.elbow)
             }
-            None => is_other && !is_known && self.schedule.to_tool(None, elbow),
+            None => is_other && !is_known && self.schedule.return_to_tool(None, elbow),
         }
     }
 

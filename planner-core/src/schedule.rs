@@ -187,7 +187,7 @@ impl<'q> Schedule<'q> {
     }
 
     /// Moves the joints after everything has stopped. What follows is joint moves too, until
-    /// [`Schedule::to_tool`].
+    /// [`Schedule::return_to_tool`].
     ///
     /// `false` if the look-ahead is full.
     pub fn move_joints(&mut self, from: JointPosition, to: JointPosition, duration_s: f64) -> bool {
@@ -201,7 +201,7 @@ impl<'q> Schedule<'q> {
     /// elbow on a side.
     ///
     /// `false` if the look-ahead is full.
-    pub fn to_tool(&mut self, pose: Option<Pose>, elbow: Elbow) -> bool {
+    pub fn return_to_tool(&mut self, pose: Option<Pose>, elbow: Elbow) -> bool {
         self.push_stopped(RawItem::Action(Action::ToTool(pose, elbow)))
     }
 
