@@ -13,6 +13,7 @@ pub mod commands;
 pub mod emulator;
 pub mod link;
 pub mod machine;
+pub mod methods;
 pub mod oracle;
 pub mod paired_run;
 pub mod pictures;

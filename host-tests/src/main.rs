@@ -5,8 +5,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use host_tests::commands::{
-    Failure, compare, corner, demo, emulate, forward, inverse, monitor, prefilter, profile, run,
-    send,
+    Failure, compare, corner, demo, emulate, forward, inverse, methods, monitor, prefilter,
+    profile, run, send,
 };
 
 /// Motion control that leaves the robot still: plans, runs and measures path programs.
@@ -32,6 +32,8 @@ enum Command {
     Monitor(monitor::MonitorArgs),
     /// Runs a program with every prefilter and shows the figures side by side.
     Compare(compare::CompareArgs),
+    /// Runs a program by other methods of motion too and shows the figures side by side.
+    Methods(methods::MethodsArgs),
     /// Solves one corner: how much two segments may overlap within a tolerance.
     Corner(corner::CornerArgs),
     /// Shows how long a prefilter is and how much vibration it leaves.
@@ -52,6 +54,7 @@ fn main() -> ExitCode {
         Some(Command::Send(args)) => return end(send::execute(&args)),
         Some(Command::Monitor(args)) => return end(monitor::execute(&args)),
         Some(Command::Compare(args)) => compare::execute(&args),
+        Some(Command::Methods(args)) => methods::execute(&args),
         Some(Command::Corner(args)) => corner::execute(&args),
         Some(Command::Prefilter(args)) => prefilter::execute(&args),
         Some(Command::Profile(args)) => profile::execute(&args),

@@ -35,6 +35,15 @@ pub struct Block {
 }
 
 impl Block {
+    /// Centre and swept angle in radians, positive counter-clockwise, of an arc.
+    #[must_use]
+    pub fn arc(&self) -> Option<([f64; 2], f64)> {
+        match self.curve {
+            Curve::Line => None,
+            Curve::Arc(centre, sweep_rad) => Some((centre, sweep_rad)),
+        }
+    }
+
     /// Points along the block, its start left out; chords within 1 nm of the arc.
     #[must_use]
     pub fn points(&self) -> Vec<[f64; 3]> {

@@ -7,6 +7,7 @@ pub mod emulate;
 mod failure;
 pub mod forward;
 pub mod inverse;
+pub mod methods;
 mod model_args;
 pub mod monitor;
 pub mod output;

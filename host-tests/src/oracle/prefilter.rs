@@ -75,6 +75,11 @@ impl Prefilter {
         Some(Self::new(&impulses, boxes))
     }
 
+    /// Times in seconds and amplitudes of its impulses.
+    pub fn impulses(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.impulses.iter().copied()
+    }
+
     /// Length `T_h` of the impulse response in seconds.
     #[must_use]
     pub fn length_s(&self) -> f64 {

@@ -33,6 +33,12 @@ impl Mode {
         TAU * self.frequency_hz
     }
 
+    /// Damped period `T_d` in seconds.
+    #[must_use]
+    pub fn damped_period_s(&self) -> f64 {
+        1.0 / (self.frequency_hz * (1.0 - self.damping * self.damping).sqrt())
+    }
+
     /// Acceleration of the mass, `ÿ = −ω² w − 2ζω ẇ`.
     #[must_use]
     pub fn acceleration(&self, deflection: f64, rate: f64) -> f64 {

@@ -1,0 +1,11 @@
+; Arcs and lines that meet smoothly or at flat angles.
+G21 G90 G17 G94
+G0 X200 Y-60
+G1 F9600 X260
+G3 X260 Y-20 I0 J20
+G1 X210 Y-15
+G2 X210 Y25 I0 J20
+G1 X270 Y30
+G3 X270 Y70 I0 J20
+G1 X200 Y60
+M2

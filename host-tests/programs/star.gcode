@@ -1,0 +1,9 @@
+; A star of five points: reversals by 144 degrees.
+G21 G90 G17 G94
+G0 X240 Y50
+G1 F9600 X210.611 Y-40.451
+X287.553 Y15.451
+X192.447 Y15.451
+X269.389 Y-40.451
+X240 Y50
+M2
