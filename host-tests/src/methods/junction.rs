@@ -62,16 +62,16 @@ pub fn within_tolerance(task: &Task, shaper: &Prefilter, most_mm_s2: f64) -> Vec
 fn junctions(task: &Task, acceleration: f64, deviation_mm: f64) -> Vec<f64> {
     let count = task.curves.len();
     let mut squares = vec![0.0; count + 1];
-    for i in 1..count {
-        let (before, after) = (task.curves[i - 1], task.curves[i]);
+    for (i, corner) in task.curves.windows(2).enumerate() {
+        let (before, after) = (corner[0], corner[1]);
         let turn_deg = change_angle_deg(
             xyz(before.tangent(before.length())),
             xyz(after.tangent(0.0)),
         );
         let half_sin = ((180.0 - turn_deg) / 2.0).to_radians().sin();
-        let slower = top(task, i - 1, acceleration).min(top(task, i, acceleration));
+        let slower = top(task, i, acceleration).min(top(task, i + 1, acceleration));
         let by_deviation = acceleration * deviation_mm * half_sin / (1.0 - half_sin).max(1e-9);
-        squares[i] = by_deviation.min(slower * slower);
+        squares[i + 1] = by_deviation.min(slower * slower);
     }
     let reach = |i: usize| 2.0 * acceleration * task.curves[i].length();
     for i in 0..count {
