@@ -357,6 +357,8 @@ fn a_count_of_lines_is_ended_by_m110_or_left_behind_by_a_reset() {
         desk.send(b"\x18");
         desk.run_ms(10);
         desk.heard();
+        // What is left of a line whose last byte became the reset.
+        assert!(desk.ask("").contains("ok"));
         let said = desk.ask(&checked("G21", 8));
         assert!(said.contains("error:67"), "{said}");
         assert!(desk.ask("N8 G21").contains("error:67"), "it may be damaged");

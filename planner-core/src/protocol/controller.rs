@@ -900,9 +900,14 @@ impl Controller<'_> {
         // Without a number M110 ends the count. Only with a checksum: damage must not.
         let ends_it = line.sets_number() && line.has_checksum() && line.number().is_none();
         // After a reset another sender may go on, one that never numbers its lines. A numbered
-        // line that was damaged still has its N.
-        let begins_plainly = self.sequence == Sequence::Lost && line.number().is_none();
-        if ends_it || begins_plainly {
+        // line that was damaged still has its N; where a damaged byte was the reset, nothing but
+        // the line's end may be left.
+        let is_blank = line.words().next().is_none();
+        let is_unnumbered = self.sequence == Sequence::Lost && line.number().is_none();
+        if is_unnumbered && is_blank {
+            return Ok(true);
+        }
+        if ends_it || is_unnumbered {
             self.sequence = Sequence::Off;
         }
         match (self.sequence, number) {
