@@ -102,6 +102,8 @@ async function main() {
   socket.on('serialport:read', (line) => heard.push(line));
   const command = (...args) => socket.emit('command', port, ...args);
   const position = () => ['x', 'y', 'z'].map((axis) => Number(status.mpos[axis]));
+  // Programs and jogs are waited for by the position: a busy machine is late.
+  const isUnderWay = () => waitFor(() => status.activeState === 'Run' && position()[0] > 257);
   const isIn = (state, seconds) => waitFor(() => status.activeState === state, seconds);
 
   async function checkView(name, expected) {
@@ -139,7 +141,7 @@ async function main() {
   await checkView('after the program', [250.08, 0, 0]);
 
   await stream('long', LONG);
-  await sleep(3000);
+  await isUnderWay();
   command('gcode:pause');
   const held = await waitFor(async () => status.activeState === 'Hold' && (await observe()).state === 'Hold:0');
   check('hold', held, status);
@@ -158,7 +160,7 @@ async function main() {
   await isIn('Idle');
   await checkView('after the jog', [255, 0, 0]);
   command('gcode', '$J=G91 X40 F600');
-  await sleep(1000);
+  await waitFor(() => position()[0] > 257);
   command('jogCancel');
   check('jog cancel', await isIn('Idle', 5), status);
   await sleep(500);
@@ -166,7 +168,7 @@ async function main() {
   await checkView('after the jog cancel');
 
   await stream('long', LONG);
-  await sleep(2000);
+  await isUnderWay();
   heard.length = 0;
   command('reset');
   check('reset in motion', await waitFor(() => heard.some((line) => line.startsWith('ALARM:3'))), heard);

@@ -33,6 +33,11 @@ def stands():
     return settle()
 
 
+def is_under_way(state):
+    """Waits for the position, not for a time: a busy machine is late."""
+    wait_for(lambda: streamer.cmode == state and streamer.cmpos[0] > 257)
+
+
 def run(lines):
     streamer.job_new()
     streamer.write(lines)
@@ -56,7 +61,7 @@ check("stream 1000 lines", finished and processed == 1000 and not errors, (proce
 check_view("after the program", *stands(), expected=[250.08, 0, 0])
 
 run(LONG)
-time.sleep(3)
+is_under_way("Run")
 streamer.hold()
 check("hold", wait_for(lambda: streamer.cmode == "Hold:0" and observe()[0] == "Hold:0"), streamer.cmode)
 state, held = settle()
@@ -71,7 +76,7 @@ streamer._iface_write("$J=G91 X5 F600\n")
 check("jog: it sees it", wait_for(lambda: streamer.cmode == "Jog", 3), streamer.cmode)
 check_view("after the jog", *stands(), expected=[255, 0, 0])
 streamer._iface_write("$J=G91 X40 F600\n")
-time.sleep(1)
+is_under_way("Jog")
 # It has no jog cancel of its own, and ends jogs with a hold, as Grbl allows.
 streamer.hold()
 check("jog cancel", wait_for(lambda: streamer.cmode == "Idle", 5), streamer.cmode)
@@ -80,7 +85,7 @@ check("jog cancel: it ends on its way", 256 < position[0] < 294, position)
 check_view("after the jog cancel", state, position)
 
 run(LONG)
-time.sleep(2)
+is_under_way("Run")
 events.clear()
 streamer.abort()
 check("reset in motion", wait_for(lambda: "on_boot" in events and alarms), (events, alarms))

@@ -24,6 +24,16 @@ def view():
     return streamer.last_status["state"], [float(value) for value in position]
 
 
+def is_under_way():
+    """Waits for the position, not for a time: a busy machine is late."""
+
+    def moves():
+        state, position = view()
+        return state in ("Run", "Jog") and position[0] > 257
+
+    wait_for(moves)
+
+
 streamer.connect()
 check("connect", streamer.state == State.IDLE and banners, streamer.state)
 
@@ -34,7 +44,7 @@ check_view("after the program", *view(), expected=[250.08, 0, 0, 0])
 result = []
 job = threading.Thread(target=lambda: result.append(streamer.stream(LONG, total=len(LONG))))
 job.start()
-time.sleep(3)
+is_under_way()
 streamer.pause()
 check("hold", wait_for(lambda: view()[0] == "Hold" and observe()[0] == "Hold:0"), view())
 state, held = view()
@@ -51,7 +61,7 @@ check("jog: it sees it", view()[0] == "Jog", view())
 wait_for(lambda: view()[0] == "Idle")
 check_view("after the jog", *view(), expected=[255, 0, 0, 0])
 streamer.command("$J=G91 X40 F600")
-time.sleep(1)
+is_under_way()
 streamer.realtime(b"\x85")
 check("jog cancel", wait_for(lambda: view()[0] == "Idle", 5), view())
 state, position = view()
@@ -60,7 +70,7 @@ check_view("after the jog cancel", state, position)
 
 job = threading.Thread(target=lambda: result.append(streamer.stream(LONG, total=len(LONG))))
 job.start()
-time.sleep(2)
+is_under_way()
 streamer.stop()
 job.join(10)
 check("reset in motion", wait_for(lambda: "ALARM:3" in alarms), alarms)
