@@ -158,8 +158,7 @@ impl SerialLoop<'_> {
             y: y_mm.to_fixed(),
             ..Pose::default()
         };
-        let scara = &self.controller.robot().scara;
-        scara.inverse(&pose)
+        self.controller.robot().arm.inverse(&pose)
     }
 
     /// The setpoint of the last tick.

@@ -161,7 +161,7 @@ impl Watched {
         [
             joints.joint1.to_num::<f64>().to_degrees(),
             joints.joint2.to_num::<f64>().to_degrees(),
-            joints.joint3.to_num::<f64>(),
+            joints.joint3.as_length().to_num::<f64>(),
             joints.joint4.to_num::<f64>().to_degrees(),
         ]
     }

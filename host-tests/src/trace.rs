@@ -126,7 +126,7 @@ impl Trace {
         self.setpoints.iter().map(pose).collect()
     }
 
-    /// Joint setpoints: rad, rad, mm, rad.
+    /// Joint setpoints: rad, a quill's mm.
     #[must_use]
     pub fn joints(&self) -> Vec<[f64; 4]> {
         self.setpoints.iter().map(joints).collect()
@@ -184,7 +184,7 @@ impl Trace {
     }
 }
 
-/// Columns of `trace.csv`: joints in rad, rad, mm, rad.
+/// Columns of `trace.csv`: joints in rad, a quill's mm.
 const COLUMNS: [&str; 15] = [
     "time_s",
     "x_mm",
@@ -254,13 +254,8 @@ fn pose(setpoint: &Setpoint) -> [f64; 4] {
     ]
 }
 
-/// A setpoint's joints: rad, rad, mm, rad.
+/// A setpoint's joints: rad, a quill's mm.
 fn joints(setpoint: &Setpoint) -> [f64; 4] {
-    let joints = setpoint.joints.position;
-    [
-        joints.joint1.to_num(),
-        joints.joint2.to_num(),
-        joints.joint3.to_num(),
-        joints.joint4.to_num(),
-    ]
+    let units = setpoint.arm.joint_units();
+    setpoint.joints.position.values(units)
 }

@@ -156,13 +156,8 @@ fn velocity_and_acceleration_are_those_of_the_positions() {
     let robot = robot(|_| {});
     let all = setpoints(&robot, include_str!("../programs/corner-path.gcode"));
     let joints = |setpoint: &Setpoint| {
-        let position = setpoint.joints.position;
-        [
-            position.joint1.to_num::<f64>(),
-            position.joint2.to_num(),
-            position.joint3.to_num(),
-            position.joint4.to_num(),
-        ]
+        let units = setpoint.arm.joint_units();
+        setpoint.joints.position.values(units)
     };
     for window in all.windows(3) {
         let [before, now, after] = [0, 1, 2].map(|i| joints(&window[i]));

@@ -2,13 +2,16 @@
 
 use core::fmt;
 
-use crate::kinematics::{Elbow, Scara, ScaraConfig, ScaraError};
+use crate::kinematics::{Arm, ArmKind, Elbow, JointRange, Scara, ScaraConfig, ScaraError};
+use crate::pose::AXES;
 use crate::prefilter::{Kernel, Kind, Prefilter, PrefilterConfig, PrefilterError, Response};
 
 /// Everything that a builder sets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RobotConfig {
-    /// Arm lengths, elbow and joint limits.
+    /// Which robot it is.
+    pub arm: ArmKind,
+    /// Arm lengths, elbow and joint limits, if it is a SCARA.
     pub scara: ScaraConfig,
     /// Which vibration to suppress, and how.
     pub prefilter: PrefilterConfig,
@@ -27,6 +30,7 @@ pub struct RobotConfig {
 impl Default for RobotConfig {
     fn default() -> Self {
         Self {
+            arm: ArmKind::default(),
             scara: ScaraConfig::default(),
             prefilter: PrefilterConfig::default(),
             corner_tolerance_mm: 0.5,
@@ -96,7 +100,7 @@ pub struct Robot {
     /// The settings that it was made from.
     pub config: RobotConfig,
     /// Kinematics of the arm.
-    pub scara: Scara,
+    pub arm: Arm,
     /// The prefilter in seconds.
     pub prefilter: Prefilter,
     /// The prefilter in integer taps.
@@ -133,7 +137,9 @@ impl Robot {
         let prefilter = Prefilter::new(&config.prefilter)?;
         Ok(Self {
             config: *config,
-            scara: Scara::new(&config.scara)?,
+            arm: match config.arm {
+                ArmKind::Scara => Arm::Scara(Scara::new(&config.scara)?),
+            },
             kernel: Kernel::new(&prefilter)?,
             accelerating: prefilter.response(),
             decelerating: prefilter.reversed_response(),
@@ -144,7 +150,7 @@ impl Robot {
     /// Changes the side of the elbow.
     pub fn set_elbow(&mut self, elbow: Elbow) {
         self.config.scara.elbow = elbow;
-        self.scara.set_elbow(elbow);
+        self.arm.set_elbow(elbow);
     }
 
     /// Changes the prefilter.
@@ -224,6 +230,14 @@ impl RobotConfig {
         &["yaw-limit"],
         &["joint-speed"],
     ];
+
+    /// Travels of joints 1 to 4 in ° or mm.
+    #[must_use]
+    pub const fn joint_limits(&self) -> [JointRange; AXES] {
+        match self.arm {
+            ArmKind::Scara => self.scara.joint_limits,
+        }
+    }
 
     /// Sets values from `name=value` texts between blanks, as a `$` line carries them.
     ///

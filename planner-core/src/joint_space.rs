@@ -5,7 +5,8 @@
 //! walked, held and filtered as tool moves are: a joint moves at constant speed, and the
 //! prefilter rounds its start and its stop.
 
-use crate::pose::{AXES, JointPosition, JointState};
+use crate::kinematics::ArmKind;
+use crate::pose::{AXES, JointPosition, JointState, JointUnit};
 use crate::prefilter::FINE_BITS;
 use crate::units::TICK_HZ;
 
@@ -24,12 +25,14 @@ const ANGLE_BITS: u32 = 26 + FINE_BITS;
 /// Those of a fine length in mm.
 const LENGTH_BITS: u32 = 19 + FINE_BITS;
 
-/// Bits behind the point, by joint.
-const BITS: [u32; AXES] = [ANGLE_BITS, ANGLE_BITS, LENGTH_BITS, ANGLE_BITS];
-
 /// What the joints have to do, from their positions as the filters give them: `twice` is the
 /// change over two ticks, `bend` the second difference.
-pub(crate) fn state(position: JointPosition, twice: [i64; AXES], bend: [i64; AXES]) -> JointState {
+pub(crate) fn state(
+    arm: ArmKind,
+    position: JointPosition,
+    twice: [i64; AXES],
+    bend: [i64; AXES],
+) -> JointState {
     const HZ: f32 = TICK_HZ as f32;
     let scaled = |value: i64, bits: u32, factor: f32| {
         // 2^-28 rad or 2^-21 mm: what a joint moves in two ticks fits
@@ -38,7 +41,11 @@ pub(crate) fn state(position: JointPosition, twice: [i64; AXES], bend: [i64; AXE
     };
     let by_joint = |values: [i64; AXES], factor: f32| {
         let mut result = [0.0; AXES];
-        for ((result, value), bits) in result.iter_mut().zip(values).zip(BITS) {
+        for ((result, value), unit) in result.iter_mut().zip(values).zip(arm.joint_units()) {
+            let bits = match unit {
+                JointUnit::Angle => ANGLE_BITS,
+                JointUnit::Length => LENGTH_BITS,
+            };
             *result = scaled(value, bits, factor);
         }
         result

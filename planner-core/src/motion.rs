@@ -3,7 +3,7 @@
 use crate::arcs::{ARC_CHANNELS, ArcFilters, Arcs};
 use crate::config::Robot;
 use crate::joint_space::{self, Space};
-use crate::kinematics::{Elbow, Scara};
+use crate::kinematics::{Arm, ArmKind, Elbow};
 use crate::pose::{AXES, JointPosition, JointState, Pose};
 use crate::prefilter::{Convolver, FINE_BITS, Kernel};
 use crate::queue::{Action, RawItem, SegmentConsumer};
@@ -67,6 +67,8 @@ pub struct Setpoint {
     pub pose: Pose,
     /// What the joints have to do.
     pub joints: JointState,
+    /// Whose joints these are, which tells their units.
+    pub arm: ArmKind,
     /// Whether the robot moves.
     pub state: MotionState,
     /// The digital outputs: bit 0 the gripper, bit 1 the blow-off.
@@ -125,7 +127,7 @@ impl DelayLines {
 pub struct Motion<'q> {
     walker: Walker<'q>,
     kernel: Kernel,
-    kinematics: Scara,
+    kinematics: Arm,
     filters: &'q mut DelayLines,
     arcs: Arcs,
     /// Commands of the last two ticks in 2^-32 mm, oldest first.
@@ -175,7 +177,7 @@ impl<'q> Motion<'q> {
         Self {
             walker: Walker::new(segments, start),
             kernel: robot.kernel.clone(),
-            kinematics: robot.scara.clone(),
+            kinematics: robot.arm.clone(),
             filters,
             arcs: Arcs::default(),
             history: [[0; AXES]; 2],
@@ -224,7 +226,7 @@ impl<'q> Motion<'q> {
             let pose = self.pose();
             let joints = self.kinematics.inverse(&pose);
             self.kernel = robot.kernel.clone();
-            self.kinematics = robot.scara.clone();
+            self.kinematics = robot.arm.clone();
             self.rest_at(self.nearest_point());
             // Another arm at the same pose.
             self.placed |= self.space == Space::Tool && self.kinematics.inverse(&pose) != joints;
@@ -302,13 +304,14 @@ impl<'q> Motion<'q> {
             }
             Space::Joints => {
                 let position = JointPosition::from_bits(point);
-                let joints = joint_space::state(position, twice, bend);
+                let joints = joint_space::state(self.kinematics.kind(), position, twice, bend);
                 (self.kinematics.forward(&position), joints)
             }
         };
         Setpoint {
             pose,
             joints,
+            arm: self.kinematics.kind(),
             state: self.state(),
             outputs: self.outputs,
             placed: core::mem::take(&mut self.placed),

@@ -7,7 +7,7 @@ use crate::gcode::{
     self, Command, Defaults, Feed, Interpreted, Interpreter, Line, MAX_ACTIONS_A_LINE, Move,
     Offsets, ProgramFlow, RobotChange,
 };
-use crate::kinematics::{Elbow, PoseError, Scara, SegmentError};
+use crate::kinematics::{Arm, Elbow, PoseError, SegmentError};
 use crate::path::PathSegment;
 use crate::pose::{JointPosition, Pose};
 use crate::prefilter::{Kernel, Prefilter, PrefilterConfig, PrefilterError};
@@ -229,9 +229,9 @@ impl<'q> Planner<'q> {
     /// Checks a command with the elbow on the side to which the lines before have brought it.
     #[inline(never)]
     fn check_with_elbow(&self, elbow: Elbow, command: &Command) -> Result<(), Cause> {
-        let mut scara = self.robot.scara.clone();
-        scara.set_elbow(elbow);
-        self.timings(&scara, command).map(drop)
+        let mut arm = self.robot.arm.clone();
+        arm.set_elbow(elbow);
+        self.timings(&arm, command).map(drop)
     }
 
     /// Whether the line would be accepted now; changes nothing but the count of refusals.
@@ -241,7 +241,7 @@ impl<'q> Planner<'q> {
     pub fn would_accept(&mut self, line: &Line) -> Result<(), LineError> {
         let interpreted = self.interpreter.interpret(line);
         let interpreted = interpreted.map_err(|error| self.refused(error))?;
-        let checked = self.timings(&self.robot.scara, &interpreted.command);
+        let checked = self.timings(&self.robot.arm, &interpreted.command);
         checked.map(drop).map_err(|cause| self.refusal(cause))
     }
 
@@ -274,10 +274,11 @@ impl<'q> Planner<'q> {
     }
 
     fn know_joints(&mut self, joints: &JointPosition) -> Pose {
-        let elbow = Elbow::of(joints.joint2);
-        self.robot.set_elbow(elbow);
-        self.interpreter.set_elbow(elbow);
-        self.robot.scara.forward(joints)
+        if let Some(elbow) = self.robot.arm.elbow_at(joints) {
+            self.robot.set_elbow(elbow);
+            self.interpreter.set_elbow(elbow);
+        }
+        self.robot.arm.forward(joints)
     }
 
     /// The position is not known any more.
@@ -332,7 +333,7 @@ impl<'q> Planner<'q> {
     /// Queues the actions of a line, all or none, and commits what it leaves behind.
     fn carry_out(&mut self, interpreted: &Interpreted) -> Result<Accepted, Cause> {
         let command = &interpreted.command;
-        let timings = self.timings(&self.robot.scara, command)?;
+        let timings = self.timings(&self.robot.arm, command)?;
         if !self.has_room() {
             return Err(Cause::Full);
         }
@@ -348,7 +349,7 @@ impl<'q> Planner<'q> {
                 queued |= self.schedule.change_prefilter(&self.robot.kernel);
             }
             Some(RobotChange::Elbow(elbow)) => {
-                let change = self.elbow_move(&self.robot.scara, *elbow)?;
+                let change = self.elbow_move(&self.robot.arm, *elbow)?;
                 folded = change.as_ref().map(|change| change.pose);
                 queued |= self.change_elbow(*elbow, change.as_ref());
             }
@@ -418,13 +419,14 @@ impl<'q> Planner<'q> {
     /// that was stopped near its stretched pose folds as far as the margin asks.
     /// Not inlined, so that the other arm is on the stack for a moment only.
     #[inline(never)]
-    fn elbow_move(&self, scara: &Scara, elbow: Elbow) -> Result<Option<ElbowMove>, Cause> {
+    fn elbow_move(&self, arm: &Arm, elbow: Elbow) -> Result<Option<ElbowMove>, Cause> {
         let Some(position) = self.interpreter.modal().position() else {
             return Ok(None);
         };
         if elbow == self.robot.config.scara.elbow && self.joints.is_none() {
             return Ok(None);
         }
+        let Arm::Scara(scara) = arm;
         let from = self.joints.unwrap_or_else(|| scara.inverse(&position));
         let mut scara = scara.clone();
         scara.set_elbow(elbow);
@@ -450,18 +452,18 @@ impl<'q> Planner<'q> {
     }
 
     /// How long each motion of a line takes, once the robot can do all that the line asks for.
-    fn timings(&self, scara: &Scara, command: &Command) -> Result<[Timing; 2], Cause> {
+    fn timings(&self, arm: &Arm, command: &Command) -> Result<[Timing; 2], Cause> {
         match &command.robot {
             Some(RobotChange::Prefilter(config)) => {
                 Self::check_prefilter(config).map_err(Cause::Prefilter)?;
             }
             Some(RobotChange::Elbow(elbow)) => {
-                self.elbow_move(scara, *elbow)?;
+                self.elbow_move(arm, *elbow)?;
             }
             None => {}
         }
         if let Some(pose) = &command.reference {
-            scara.check(pose).map_err(Cause::Pose)?;
+            arm.check(pose).map_err(Cause::Pose)?;
         }
         // A dwell stands where a move may begin only.
         if let (Some(_), Some(pose), Some(_)) = (
@@ -469,11 +471,11 @@ impl<'q> Planner<'q> {
             self.interpreter.modal().position(),
             command.dwell_s,
         ) {
-            scara.check(&pose).map_err(Cause::Pose)?;
+            arm.check(&pose).map_err(Cause::Pose)?;
         }
         let mut timings = [Timing::default(); 2];
         for (order, timing) in command.moves().zip(&mut timings) {
-            *timing = self.checked_timing(scara, order)?;
+            *timing = self.checked_timing(arm, order)?;
         }
         Ok(timings)
     }
@@ -484,7 +486,7 @@ impl<'q> Planner<'q> {
     }
 
     /// How long a motion takes; zero if it is shorter than anything.
-    fn checked_timing(&self, scara: &Scara, order: &Move) -> Result<Timing, Cause> {
+    fn checked_timing(&self, arm: &Arm, order: &Move) -> Result<Timing, Cause> {
         let timing = self.timing(&order.path, order.feed);
         if timing.duration_s > LONGEST_S {
             return Err(Cause::TooSlow {
@@ -492,7 +494,7 @@ impl<'q> Planner<'q> {
             });
         }
         if timing.duration_s > 0.0 {
-            let checked = scara.check_segment(&order.path);
+            let checked = arm.check_segment(&order.path);
             checked.map_err(Cause::Segment)?;
         }
         Ok(timing)

@@ -42,21 +42,110 @@ impl Pose {
     }
 }
 
-/// Positions of a SCARA's joints.
+/// What the position of a joint counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointUnit {
+    /// Angles: [`AngleRad`], shown in degrees.
+    Angle,
+    /// Lengths: [`LengthMm`].
+    Length,
+}
+
+impl JointUnit {
+    /// Bits of a position in rad or mm, exactly.
+    #[must_use]
+    pub fn value(self, bits: i32) -> f64 {
+        match self {
+            Self::Angle => AngleRad::from_bits(bits).to_num(),
+            Self::Length => LengthMm::from_bits(bits).to_num(),
+        }
+    }
+
+    /// Bits of a position in ° or mm, for people.
+    #[must_use]
+    pub fn shown(self, bits: i32) -> f32 {
+        match self {
+            Self::Angle => AngleRad::from_bits(bits).to_num::<f32>().to_degrees(),
+            Self::Length => LengthMm::from_bits(bits).to_num(),
+        }
+    }
+
+    /// Bits of a position given in ° or mm; saturates.
+    #[must_use]
+    pub fn bits(self, shown: f32) -> i32 {
+        match self {
+            Self::Angle => AngleRad::saturating_from_num(f64::from(shown).to_radians()).to_bits(),
+            Self::Length => LengthMm::saturating_from_num(shown).to_bits(),
+        }
+    }
+
+    /// The unit's sign behind a number shown.
+    #[must_use]
+    pub const fn sign(self) -> &'static str {
+        match self {
+            Self::Angle => "°",
+            Self::Length => " mm",
+        }
+    }
+}
+
+/// Position of joint 3: an angle or a length, as the arm has it. Whoever reads it knows the arm.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Joint3(i32);
+
+impl Joint3 {
+    /// A quill at this length.
+    #[must_use]
+    pub const fn from_length(length: LengthMm) -> Self {
+        Self(length.to_bits())
+    }
+
+    /// An arm at this angle.
+    #[must_use]
+    pub const fn from_angle(angle: AngleRad) -> Self {
+        Self(angle.to_bits())
+    }
+
+    /// Where it is, being a quill.
+    #[must_use]
+    pub const fn as_length(self) -> LengthMm {
+        LengthMm::from_bits(self.0)
+    }
+
+    /// Where it is, being an arm.
+    #[must_use]
+    pub const fn as_angle(self) -> AngleRad {
+        AngleRad::from_bits(self.0)
+    }
+
+    /// The raw bits of either.
+    #[must_use]
+    pub const fn to_bits(self) -> i32 {
+        self.0
+    }
+
+    /// The inverse of [`Joint3::to_bits`].
+    #[must_use]
+    pub const fn from_bits(bits: i32) -> Self {
+        Self(bits)
+    }
+}
+
+/// Positions of a robot's joints; the doc of each names the SCARA's, then the delta's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct JointPosition {
-    /// Shoulder, about Z, zero along +X.
+    /// Shoulder, about Z, zero along +X; first arm, zero when level, positive down.
     pub joint1: AngleRad,
-    /// Elbow, relative to the upper arm, zero when stretched.
+    /// Elbow, relative to the upper arm, zero when stretched; second arm.
     pub joint2: AngleRad,
-    /// Quill, equal to Z of the tool.
-    pub joint3: LengthMm,
-    /// Wrist, relative to the forearm.
+    /// Quill, equal to Z of the tool; third arm.
+    pub joint3: Joint3,
+    /// Wrist, relative to the forearm; the tool's yaw.
     pub joint4: AngleRad,
 }
 
 impl JointPosition {
-    /// The raw bits of joints 1, 2, 4 (2^-26 rad) and 3 (2^-19 mm), in the order of the joints.
+    /// The raw bits in the order of the joints: 2^-26 rad or, for a quill, 2^-19 mm.
     #[must_use]
     pub const fn to_bits(self) -> [i32; AXES] {
         [
@@ -73,9 +162,23 @@ impl JointPosition {
         Self {
             joint1: AngleRad::from_bits(joint1),
             joint2: AngleRad::from_bits(joint2),
-            joint3: LengthMm::from_bits(joint3),
+            joint3: Joint3::from_bits(joint3),
             joint4: AngleRad::from_bits(joint4),
         }
+    }
+
+    /// In rad and mm, exactly.
+    #[must_use]
+    pub fn values(self, units: [JointUnit; AXES]) -> [f64; AXES] {
+        let bits = self.to_bits();
+        core::array::from_fn(|joint| units[joint].value(bits[joint]))
+    }
+
+    /// In ° and mm, for people.
+    #[must_use]
+    pub fn shown(self, units: [JointUnit; AXES]) -> [f32; AXES] {
+        let bits = self.to_bits();
+        core::array::from_fn(|joint| units[joint].shown(bits[joint]))
     }
 }
 
@@ -84,8 +187,8 @@ impl JointPosition {
 pub struct JointState {
     /// Joint positions.
     pub position: JointPosition,
-    /// Joint velocities: rad/s, rad/s, mm/s, rad/s.
+    /// Joint velocities in rad/s; a quill's in mm/s.
     pub velocity: [f32; AXES],
-    /// Joint accelerations: rad/s², rad/s², mm/s², rad/s².
+    /// Joint accelerations in rad/s²; a quill's in mm/s².
     pub acceleration: [f32; AXES],
 }

@@ -20,6 +20,7 @@
 //! | 73 | overruns | u32, control periods missed since the start |
 //! | 77 | outputs | u8, bit 0 gripper, bit 1 blow-off |
 
+use crate::kinematics::ArmKind;
 use crate::motion::{MotionState, Setpoint};
 use crate::pose::{JointPosition, JointState, Pose};
 
@@ -108,6 +109,7 @@ impl SetpointFrame {
                     velocity,
                     acceleration,
                 },
+                arm: ArmKind::Scara,
                 state: state_from_byte(state & !PLACED)?,
                 placed: state & PLACED != 0,
                 outputs,
@@ -257,6 +259,7 @@ mod tests {
                     velocity: [0.0, -0.0, 1.5, f32::MIN_POSITIVE],
                     acceleration: [-1e9, 0.25, 0.0, 3.0],
                 },
+                arm: ArmKind::Scara,
                 state: MotionState::Running,
                 outputs: 2,
                 placed: true,
@@ -344,6 +347,7 @@ mod tests {
                         velocity: velocity.map(f32::from_bits),
                         acceleration: acceleration.map(f32::from_bits),
                     },
+                    arm: ArmKind::Scara,
                     state: state_from_byte(state % 5).unwrap(),
                     outputs,
                     placed,

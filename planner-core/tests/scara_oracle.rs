@@ -1,7 +1,7 @@
 //! The SCARA's kinematics against the textbook's formulas in `f64`.
 
 use planner_core::kinematics::{Elbow, JointRange, PoseError, Scara, ScaraConfig, ScaraError};
-use planner_core::pose::{AXES, JointPosition, Pose};
+use planner_core::pose::{AXES, Joint3, JointPosition, Pose};
 use planner_core::units::{AngleDeg, AngleRad, LengthMm};
 use proptest::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -69,7 +69,7 @@ fn joints([t1, t2, d3, t4]: [f64; 4]) -> JointPosition {
     JointPosition {
         joint1: AngleRad::from_num(t1),
         joint2: AngleRad::from_num(t2),
-        joint3: LengthMm::from_num(d3),
+        joint3: Joint3::from_length(LengthMm::from_num(d3)),
         joint4: AngleRad::from_num(t4),
     }
 }
@@ -78,7 +78,7 @@ fn joints_f64(j: &JointPosition) -> [f64; 4] {
     [
         j.joint1.to_num(),
         j.joint2.to_num(),
-        j.joint3.to_num(),
+        j.joint3.as_length().to_num(),
         j.joint4.to_num(),
     ]
 }
@@ -334,7 +334,7 @@ proptest! {
         let joints = JointPosition {
             joint1: AngleRad::from_bits(bits[0]),
             joint2: AngleRad::from_bits(bits[1]),
-            joint3: LengthMm::from_bits(bits[2]),
+            joint3: Joint3::from_bits(bits[2]),
             joint4: AngleRad::from_bits(bits[3]),
         };
         let _ = (scara.forward(&joints), scara.jacobian(&joints));

@@ -7,7 +7,7 @@ use clap::Args;
 use fixed::types::{I6F26, I13F19};
 use planner_core::config::Robot;
 use planner_core::kinematics::{JointRange, PoseError};
-use planner_core::pose::JointPosition;
+use planner_core::pose::{Joint3, JointPosition};
 use serde::Serialize;
 
 use super::inverse::finite;
@@ -48,7 +48,7 @@ struct Place {
 pub fn execute(args: &ForwardArgs) -> Result<String> {
     let robot = Robot::new(&RobotSettings::load(args.robot.as_deref())?.robot)?;
     let joints = [args.joint1, args.joint2, args.joint3, args.joint4];
-    let limits = robot.config.scara.joint_limits;
+    let limits = robot.config.joint_limits();
     for ((joint, value), limits) in (1..).zip(joints).zip(limits) {
         let value = finite(&format!("joint {joint}"), value)?;
         within(joint, value, limits)?;
@@ -57,11 +57,13 @@ pub fn execute(args: &ForwardArgs) -> Result<String> {
         I6F26::checked_from_num(degrees.to_radians())
             .ok_or_else(|| anyhow!("{degrees}° leaves the number range: keep within ±1800°"))
     };
-    let pose = robot.scara.forward(&JointPosition {
+    let pose = robot.arm.forward(&JointPosition {
         joint1: angle(args.joint1)?,
         joint2: angle(args.joint2)?,
-        joint3: I13F19::checked_from_num(args.joint3)
-            .ok_or_else(|| anyhow!("{} mm leaves the number range", args.joint3))?,
+        joint3: Joint3::from_length(
+            I13F19::checked_from_num(args.joint3)
+                .ok_or_else(|| anyhow!("{} mm leaves the number range", args.joint3))?,
+        ),
         joint4: angle(args.joint4)?,
     });
     let place = Place {

@@ -71,12 +71,12 @@ pub fn execute(args: &InverseArgs) -> Result<String> {
         z: coordinate("Z", args.z)?,
         c: coordinate("C", args.c)?,
     };
-    let joints = robot.scara.check(&pose)?;
+    let joints = robot.arm.check(&pose)?;
     let degrees = |angle: I6F26| angle.to_num::<f64>().to_degrees();
     let joints = Joints {
         joint1: degrees(joints.joint1),
         joint2: degrees(joints.joint2),
-        joint3: joints.joint3.to_num(),
+        joint3: joints.joint3.as_length().to_num(),
         joint4: degrees(joints.joint4),
     };
     if args.json {

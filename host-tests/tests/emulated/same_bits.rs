@@ -19,6 +19,7 @@ use host_tests::software_loop::{self, Controller};
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::kinematics::Elbow;
 use planner_core::motion::{DelayLines, MotionState, Setpoint};
+use planner_core::pose::Joint3;
 use planner_core::prefilter::Kind;
 use planner_core::queue::{LOOKAHEAD, SegmentQueue};
 use planner_core::units::{AngleDeg, AngleRad, LengthMm};
@@ -96,6 +97,8 @@ fn fields(setpoint: &Setpoint) -> [(&'static str, u32); 18] {
     let Setpoint {
         pose,
         joints,
+        // the robot's own, whatever it does
+        arm: _,
         state,
         outputs,
         // The two are placed by different means.
@@ -367,7 +370,7 @@ fn a_single_bit_is_found_and_named() {
         &|s| s.pose.c ^= AngleDeg::DELTA,
         &|s| s.joints.position.joint1 ^= AngleRad::DELTA,
         &|s| s.joints.position.joint2 ^= AngleRad::DELTA,
-        &|s| s.joints.position.joint3 ^= LengthMm::DELTA,
+        &|s| s.joints.position.joint3 = Joint3::from_bits(1 ^ s.joints.position.joint3.to_bits()),
         &|s| s.joints.position.joint4 ^= AngleRad::DELTA,
         &|s| flip(&mut s.joints.velocity[0]),
         &|s| flip(&mut s.joints.velocity[1]),

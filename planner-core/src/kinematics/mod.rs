@@ -1,15 +1,19 @@
 //! From where the tool is to where the joints are, and back.
 //!
+//! [`Arm`] is the robot's, whichever kind it is.
+//!
 //! [`ScaraConfig`] (millimetres, degrees) is validated once into a [`Scara`] (machine units),
 //! which every tick maps poses to joint states: [`Scara::joint_state`] cannot fail. What could
 //! fail, a path that leaves the workspace, is found before motion by [`Scara::check`] for a
 //! pose and [`Scara::check_segment`] for everything between two.
 
+mod arm;
 mod config;
 mod pose_check;
 mod scara;
 mod segment_check;
 
+pub use arm::{Arm, ArmKind};
 pub use config::{Elbow, JointRange, ScaraConfig, ScaraError};
 pub use pose_check::PoseError;
 pub use scara::Scara;

@@ -8,7 +8,7 @@
 
 use super::config::{Elbow, ScaraConfig, ScaraError};
 use crate::math::{atan2, sin_cos, sine_from_cosine, turns};
-use crate::pose::{AXES, JointPosition, JointState, Pose};
+use crate::pose::{AXES, Joint3, JointPosition, JointState, Pose};
 use crate::units::{AngleDeg, AngleRad, LengthMm};
 
 /// `π/180` from AngleDeg (2^-19 °) to AngleRad (2^-26 rad), Q29.
@@ -191,7 +191,7 @@ impl Scara {
             position: JointPosition {
                 joint1: AngleRad::from_bits(joint1),
                 joint2: AngleRad::from_bits(joint2),
-                joint3: pose.z,
+                joint3: Joint3::from_length(pose.z),
                 joint4: AngleRad::from_bits(joint4),
             },
             sine2,
@@ -286,7 +286,7 @@ impl Scara {
         Pose {
             x: sum(c1, c12),
             y: sum(s1, s12),
-            z: joints.joint3,
+            z: joints.joint3.as_length(),
             c: AngleDeg::from_bits(saturate((angle * DEG_PER_RAD_Q31 + (1 << 30)) >> 31)),
         }
     }

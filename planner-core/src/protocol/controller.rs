@@ -766,7 +766,10 @@ impl Controller<'_> {
                 inputs: report.inputs,
                 outputs: report.setpoint.outputs,
                 rates: self.rates,
-                joints: (full || protocol.report_joints).then_some(report.setpoint.joints.position),
+                joints: (full || protocol.report_joints).then_some((
+                    report.setpoint.arm.joint_units(),
+                    report.setpoint.joints.position,
+                )),
                 with_offset: full || extra == Extra::Offset,
                 with_overrides: full || extra == Extra::Overrides,
             }
@@ -1205,8 +1208,14 @@ impl Controller<'_> {
             touched: report.progress.touched,
             limits: report.inputs.limits,
         };
-        let travels = (self.robot().config.scara.joint_limits).map(|range| range.max - range.min);
-        match self.homing.next(&self.settings.homing, &travels, &outcome) {
+        let travels = self
+            .robot()
+            .config
+            .joint_limits()
+            .map(|range| range.max - range.min);
+        let units = self.robot().arm.kind().joint_units();
+        let homing = &self.settings.homing;
+        match self.homing.next(homing, units, &travels, &outcome) {
             homing::Next::Move {
                 to,
                 duration_s,

@@ -13,12 +13,11 @@
 //! The position counts in the tick in which the input changes, and the arm stops as it always
 //! does, through the prefilter. An input that bounces does so within that time.
 
-use crate::pose::{AXES, JointPosition};
-use crate::units::{AngleRad, LengthMm};
+use crate::pose::{AXES, JointPosition, JointUnit};
 
 use super::alarm::Alarm;
 
-/// How the joints find their limit inputs. Lengths of joint 3 are in mm, angles in degrees.
+/// How the joints find their limit inputs. Angles are in degrees, a quill's lengths in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HomingConfig {
     /// Joints with a limit input, a bit each from joint 1 on; the others are taken to stand at
@@ -124,15 +123,18 @@ impl Homing {
         }
     }
 
-    /// What to do next, everything standing. `travels` are the joints' travels in ° or mm.
+    /// What to do next, everything standing. `travels` are the joints' travels in ° or mm, by
+    /// their `units`.
     pub fn next(
         &mut self,
         config: &HomingConfig,
+        units: [JointUnit; AXES],
         travels: &[f32; AXES],
         outcome: &Outcome,
     ) -> Next {
         while let Some(&joint) = ORDER.get(self.turn) {
-            if let Some(next) = self.joint_next(joint, config, travels, outcome) {
+            let unit = units.get(joint).copied().unwrap_or(JointUnit::Angle);
+            if let Some(next) = self.joint_next((joint, unit), config, travels, outcome) {
                 return next;
             }
             self.turn += 1;
@@ -148,14 +150,14 @@ impl Homing {
     /// What a joint does next; nothing when it is done.
     fn joint_next(
         &mut self,
-        joint: usize,
+        (joint, unit): (usize, JointUnit),
         config: &HomingConfig,
         travels: &[f32; AXES],
         outcome: &Outcome,
     ) -> Option<Next> {
         let at = |values: &[f32; AXES]| values.get(joint).copied().unwrap_or_default();
         let here = outcome.joints.to_bits().get(joint).copied().unwrap_or(0);
-        let home_position = bits(joint, at(&config.positions));
+        let home_position = unit.bits(at(&config.positions));
         let is_active = outcome.limits & (1 << joint) != 0;
         let away = if config.at_lower_end & (1 << joint) == 0 {
             -1.0
@@ -165,7 +167,7 @@ impl Homing {
         let go = |way: f32, speed: f32, until| {
             let mut to = outcome.joints.to_bits();
             if let Some(value) = to.get_mut(joint) {
-                *value = value.saturating_add(bits(joint, way));
+                *value = value.saturating_add(unit.bits(way));
             }
             Some(Next::Move {
                 to: JointPosition::from_bits(to),
@@ -208,8 +210,8 @@ impl Homing {
                     return failed(Alarm::HomingNotFound);
                 };
                 self.home = home;
-                let target = home.saturating_add(bits(joint, away * config.pull_off));
-                let way = plain(joint, target.saturating_sub(here));
+                let target = home.saturating_add(unit.bits(away * config.pull_off));
+                let way = unit.shown(target.saturating_sub(here));
                 (Phase::PullOff, go(way, config.fast, None))
             }
             Phase::PullOff if is_active => return failed(Alarm::HomingPullOff),
@@ -229,27 +231,20 @@ impl Homing {
     }
 }
 
-/// A way of a joint in ° or mm, in bits of [`JointPosition`].
-fn bits(joint: usize, way: f32) -> i32 {
-    if joint == 2 {
-        LengthMm::saturating_from_num(way).to_bits()
-    } else {
-        AngleRad::saturating_from_num(f64::from(way).to_radians()).to_bits()
-    }
-}
-
-/// Bits of [`JointPosition`] as a way in ° or mm.
-fn plain(joint: usize, bits: i32) -> f32 {
-    if joint == 2 {
-        LengthMm::from_bits(bits).to_num()
-    } else {
-        AngleRad::from_bits(bits).to_num::<f32>().to_degrees()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kinematics::ArmKind;
+
+    const UNITS: [JointUnit; AXES] = ArmKind::Scara.joint_units();
+
+    fn bits(joint: usize, way: f32) -> i32 {
+        UNITS[joint].bits(way)
+    }
+
+    fn plain(joint: usize, bits: i32) -> f32 {
+        UNITS[joint].shown(bits)
+    }
 
     /// A joint with a switch below `switch`, obeying homing at once, and by `late` too far
     /// whenever a switch ends a move.
@@ -277,7 +272,7 @@ mod tests {
                 touched,
                 limits,
             };
-            match homing.next(config, &[340.0, 340.0, 400.0, 1440.0], &outcome) {
+            match homing.next(config, UNITS, &[340.0, 340.0, 400.0, 1440.0], &outcome) {
                 Next::Move {
                     to,
                     duration_s,

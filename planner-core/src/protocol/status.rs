@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-use crate::pose::{AXES, JointPosition, Pose};
-use crate::units::LengthMm;
+use crate::pose::{AXES, JointPosition, JointUnit, Pose};
+use crate::units::{AngleRad, LengthMm};
 
 use super::overrides::Rates;
 use super::report::Inputs;
@@ -145,8 +145,8 @@ pub struct Status {
     pub outputs: u8,
     /// Overrides.
     pub rates: Rates,
-    /// Joint positions, if they are asked for.
-    pub joints: Option<JointPosition>,
+    /// Joint positions with their units, if they are asked for.
+    pub joints: Option<([JointUnit; AXES], JointPosition)>,
     /// The work offset belongs in.
     pub with_offset: bool,
     /// The overrides belong in.
@@ -173,14 +173,8 @@ impl fmt::Display for Status {
         let per_min = if self.inches { 60.0 / 25.4 } else { 60.0 };
         write!(f, "|FS:{},0", (self.speed_mm_s * per_min) as u32)?;
         self.pins(f)?;
-        if let Some(joints) = self.joints {
-            let JointPosition {
-                joint1,
-                joint2,
-                joint3,
-                joint4,
-            } = joints;
-            write!(f, "|J:{joint1:.4},{joint2:.4},{joint3:.3},{joint4:.4}")?;
+        if let Some((units, joints)) = self.joints {
+            joints_in(f, units, joints)?;
         }
         if self.with_offset {
             f.write_str("|WCO:")?;
@@ -270,6 +264,23 @@ fn inches(length: LengthMm) -> LengthMm {
 }
 
 const _: () = assert!(AXES == 4, "coordinates are written one by one");
+
+/// Joint positions in rad to 1e-4 and mm to 1e-3.
+fn joints_in(
+    f: &mut fmt::Formatter<'_>,
+    units: [JointUnit; AXES],
+    joints: JointPosition,
+) -> fmt::Result {
+    f.write_str("|J:")?;
+    for (i, (unit, bits)) in units.into_iter().zip(joints.to_bits()).enumerate() {
+        let comma = if i == 0 { "" } else { "," };
+        match unit {
+            JointUnit::Angle => write!(f, "{comma}{:.4}", AngleRad::from_bits(bits))?,
+            JointUnit::Length => write!(f, "{comma}{:.3}", LengthMm::from_bits(bits))?,
+        }
+    }
+    Ok(())
+}
 
 #[cfg(test)]
 mod tests {
