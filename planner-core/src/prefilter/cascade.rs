@@ -63,6 +63,19 @@ impl Stage {
         }
     }
 
+    /// The variance of the stage's weight over time in s²: `T²/12` of a box,
+    /// `Σ A t² − (Σ A t)²` of impulses.
+    pub(super) fn variance_s2(&self) -> f64 {
+        if let Self::Box(length_s) = self {
+            return length_s * length_s / 12.0;
+        }
+        let impulses = self.impulses();
+        let mean_s: f64 = impulses.iter().map(|i| i.amplitude * i.time_s).sum();
+        // squares of what is left of the mean: no difference of large numbers
+        let from_mean = |i: &Impulse| (i.time_s - mean_s) * (i.time_s - mean_s);
+        impulses.iter().map(|i| i.amplitude * from_mean(i)).sum()
+    }
+
     /// The stage's impulses; none for a box.
     pub(super) fn impulses(&self) -> Vec<Impulse, 3> {
         match self {
@@ -168,15 +181,36 @@ impl Prefilter {
         Response::new(&self.stages, true)
     }
 
-    /// The longest box in seconds; none in a pure shaper, which lets the velocity jump.
+    /// The lengths of the boxes in seconds, the longest first; none in a pure shaper.
+    ///
+    /// A feedrate `F` through boxes `T1 ≥ T2` accelerates by at most `F/T1`, with a jerk of at
+    /// most `F/(T1 T2)`: shapers, whose weights are positive and sum to 1, make neither larger.
     #[must_use]
-    pub fn longest_box_s(&self) -> Option<f64> {
-        self.stages
+    pub fn boxes_s(&self) -> Vec<f64, MAX_STAGES> {
+        let mut boxes_s: Vec<f64, MAX_STAGES> = self
+            .stages
             .iter()
             .filter_map(|stage| match stage {
                 Stage::Box(length_s) => Some(*length_s),
                 _ => None,
             })
-            .reduce(f64::max)
+            .collect();
+        boxes_s.sort_unstable_by(|one, other| other.total_cmp(one));
+        boxes_s
+    }
+
+    /// The longest box in seconds; none in a pure shaper, which lets the velocity jump.
+    #[must_use]
+    pub fn longest_box_s(&self) -> Option<f64> {
+        self.boxes_s().first().copied()
+    }
+
+    /// `σ`, the standard deviation of the prefilter's weight over time, in seconds: a path of
+    /// curvature `κ` at a feedrate `F` is cut by about `F² κ σ²/2`.
+    ///
+    /// The variances of the stages add up.
+    #[must_use]
+    pub fn spread_s(&self) -> f64 {
+        libm::sqrt(self.stages.iter().map(Stage::variance_s2).sum())
     }
 }

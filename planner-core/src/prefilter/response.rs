@@ -30,6 +30,7 @@ pub struct Response {
     pieces: Vec<Piece, MAX_BREAKS>,
     length_s: f32,
     delay_s: f32,
+    spread_s: f32,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -91,11 +92,12 @@ impl Response {
             }
         }
         terms.sort_unstable_by(|x, y| x.b.total_cmp(&y.b));
-        Self::from_terms(&terms, degree)
+        let variance_s2: f64 = stages.iter().map(Stage::variance_s2).sum();
+        Self::from_terms(&terms, degree, libm::sqrt(variance_s2))
     }
 
     /// One polynomial a piece: shift the last one to the next breakpoint, add its term.
-    fn from_terms(terms: &[Term], degree: i32) -> Self {
+    fn from_terms(terms: &[Term], degree: i32, spread_s: f64) -> Self {
         let mut pieces = Vec::new();
         let mut now = [0.0_f64; COEFFICIENTS];
         let mut at = 0.0;
@@ -122,6 +124,7 @@ impl Response {
             pieces,
             length_s: length_s as f32,
             delay_s: delay_s as f32,
+            spread_s: spread_s as f32,
         }
     }
 
@@ -135,6 +138,12 @@ impl Response {
     #[must_use]
     pub fn delay_s(&self) -> f32 {
         self.delay_s
+    }
+
+    /// `σ`, the standard deviation of the prefilter's weight in seconds.
+    #[must_use]
+    pub fn spread_s(&self) -> f32 {
+        self.spread_s
     }
 
     /// `(S(t), I(t))`: the step response (0 to 1) and the ramp response (in seconds) at `t`.
