@@ -8,7 +8,7 @@ use std::path::Path;
 
 use planner_core::config::{ConfigError, Robot, RobotConfig};
 use planner_core::kinematics::{Elbow, JointRange, ScaraError};
-use planner_core::prefilter::{Kind, PrefilterError};
+use planner_core::prefilter::{CustomImpulse, Kind, MAX_IMPULSES, PrefilterConfig, PrefilterError};
 use serde::{Deserialize, Deserializer};
 
 use crate::plant::Mode;
@@ -130,7 +130,22 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
         ConfigError::Prefilter(error) => match error {
             PrefilterError::Frequency { .. } => vec!["prefilter.frequency_hz"],
             PrefilterError::Damping { .. } => vec!["prefilter.damping"],
+            PrefilterError::SecondFrequency { .. } => vec!["prefilter.mode2.frequency_hz"],
+            PrefilterError::SecondDamping { .. } => vec!["prefilter.mode2.damping"],
+            PrefilterError::Residual { .. } => vec!["prefilter.v_tol"],
+            PrefilterError::Box { .. } => vec!["prefilter.box_ms"],
+            PrefilterError::SCurve { .. } => {
+                vec![
+                    "prefilter.s_curve_jerk_mm_s3",
+                    "prefilter.s_curve_feed_mm_s",
+                ]
+            }
+            PrefilterError::Impulse { .. } => vec!["prefilter.impulses"],
+            PrefilterError::Smoothing { .. } => {
+                vec!["prefilter.smoothing1_ms", "prefilter.smoothing2_ms"]
+            }
             PrefilterError::TooLong { .. } => vec!["prefilter.frequency_hz", "prefilter.name"],
+            PrefilterError::TooManyKinks => vec!["prefilter.impulses", "prefilter.name"],
         },
         ConfigError::Range { name, .. } => match *name {
             "tolerance" => vec!["motion.corner_tolerance_mm"],
@@ -192,6 +207,31 @@ struct PrefilterTable {
     name: Option<Kind>,
     frequency_hz: Option<f32>,
     damping: Option<f32>,
+    v_tol: Option<f32>,
+    box_ms: Option<f32>,
+    s_curve_feed_mm_s: Option<f32>,
+    s_curve_jerk_mm_s3: Option<f32>,
+    smoothing1_ms: Option<f32>,
+    smoothing2_ms: Option<f32>,
+    mode2: SecondModeTable,
+    #[serde(deserialize_with = "impulses")]
+    impulses: Option<[CustomImpulse; MAX_IMPULSES]>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct SecondModeTable {
+    #[serde(deserialize_with = "prefilter_name")]
+    name: Option<Kind>,
+    frequency_hz: Option<f32>,
+    damping: Option<f32>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ImpulseTable {
+    time_ms: f32,
+    weight: f32,
 }
 
 #[derive(Deserialize, Default)]
@@ -225,6 +265,32 @@ fn prefilter_name<'de, D: Deserializer<'de>>(text: D) -> Result<Option<Kind>, D:
     Ok(Some(kind))
 }
 
+/// The impulses listed; those that are not are none.
+fn impulses<'de, D: Deserializer<'de>>(
+    list: D,
+) -> Result<Option<[CustomImpulse; MAX_IMPULSES]>, D::Error> {
+    let given = Vec::<ImpulseTable>::deserialize(list)?;
+    let given: Vec<_> = given
+        .iter()
+        .map(|&ImpulseTable { time_ms, weight }| CustomImpulse { time_ms, weight })
+        .collect();
+    let too_many = || format!("there are {} impulses: give 1 to 5", given.len());
+    let all = custom_impulses(&given).ok_or_else(|| serde::de::Error::custom(too_many()))?;
+    Ok(Some(all))
+}
+
+/// A list of 1 to 5 impulses as the settings have it.
+#[must_use]
+pub fn custom_impulses(given: &[CustomImpulse]) -> Option<[CustomImpulse; MAX_IMPULSES]> {
+    let none = CustomImpulse {
+        time_ms: 0.0,
+        weight: 0.0,
+    };
+    let mut all = [none; MAX_IMPULSES];
+    all.get_mut(..given.len())?.copy_from_slice(given);
+    (!given.is_empty()).then_some(all)
+}
+
 impl Tables {
     fn settings(&self) -> RobotSettings {
         let mut robot = RobotConfig::default();
@@ -247,12 +313,7 @@ impl Tables {
             set(min, travel.0);
             set(max, travel.1);
         }
-        set(&mut robot.prefilter.kind, self.prefilter.name);
-        set(
-            &mut robot.prefilter.frequency_hz,
-            self.prefilter.frequency_hz,
-        );
-        set(&mut robot.prefilter.damping, self.prefilter.damping);
+        self.prefilter.apply(&mut robot.prefilter);
         let motion = &self.motion;
         set(&mut robot.corner_tolerance_mm, motion.corner_tolerance_mm);
         set(&mut robot.rapid_mm_s, motion.rapid_mm_s);
@@ -263,6 +324,25 @@ impl Tables {
             plant: self.plant.config(&robot),
             robot,
         }
+    }
+}
+
+impl PrefilterTable {
+    fn apply(&self, prefilter: &mut PrefilterConfig) {
+        set(&mut prefilter.kind, self.name);
+        set(&mut prefilter.frequency_hz, self.frequency_hz);
+        set(&mut prefilter.damping, self.damping);
+        set(&mut prefilter.v_tol, self.v_tol);
+        set(&mut prefilter.box_ms, self.box_ms);
+        set(&mut prefilter.s_curve_feed_mm_s, self.s_curve_feed_mm_s);
+        set(&mut prefilter.s_curve_jerk_mm_s3, self.s_curve_jerk_mm_s3);
+        let [smoothing1_ms, smoothing2_ms] = &mut prefilter.smoothing_ms;
+        set(smoothing1_ms, self.smoothing1_ms);
+        set(smoothing2_ms, self.smoothing2_ms);
+        set(&mut prefilter.second.kind, self.mode2.name);
+        set(&mut prefilter.second.frequency_hz, self.mode2.frequency_hz);
+        set(&mut prefilter.second.damping, self.mode2.damping);
+        set(&mut prefilter.impulses, self.impulses);
     }
 }
 
@@ -329,6 +409,29 @@ mod tests {
     }
 
     #[test]
+    fn a_second_mode_and_a_list_of_impulses() {
+        let text = "[prefilter]\nname = 'custom'\nv_tol = 0.1\nsmoothing2_ms = 20\n\
+                    [prefilter.mode2]\nname = '2hump-ei'\nfrequency_hz = 31\ndamping = 0.01\n\
+                    [[prefilter.impulses]]\ntime_ms = 0\nweight = 2\n\
+                    [[prefilter.impulses]]\ntime_ms = 80\nweight = 1";
+        let prefilter = RobotSettings::parse("r.toml", text)
+            .unwrap()
+            .robot
+            .prefilter;
+        assert_eq!(
+            (prefilter.kind, prefilter.v_tol, prefilter.smoothing_ms),
+            (Kind::Custom, 0.1, [0.0, 20.0])
+        );
+        let second = prefilter.second;
+        assert_eq!(
+            (second.kind, second.frequency_hz, second.damping),
+            (Kind::TwoHumpEi, 31.0, 0.01)
+        );
+        let list = prefilter.impulses.map(|one| (one.time_ms, one.weight));
+        assert_eq!(list[..3], [(0.0, 2.0), (80.0, 1.0), (0.0, 0.0)]);
+    }
+
+    #[test]
     fn errors_name_file_line_and_key() {
         for (text, expected) in [
             (
@@ -364,6 +467,22 @@ mod tests {
             (
                 "[prefilter]\ndamping = nan",
                 "r.toml, line 2, key prefilter.damping: the prefilter's",
+            ),
+            (
+                "[prefilter]\nmode2.frequency_hz = 999",
+                "line 2, key prefilter.mode2.frequency_hz: the second mode's",
+            ),
+            (
+                "[prefilter]\nimpulses = []",
+                "line 2, key prefilter.impulses: there are 0 impulses",
+            ),
+            (
+                "[prefilter]\nimpulses = [{ time_ms = 1, weight = 1 }]",
+                "line 2, key prefilter.impulses: impulse 1 is out of range",
+            ),
+            (
+                "[prefilter]\nv_tol = 5",
+                "line 2, key prefilter.v_tol: the residual allowed",
             ),
             (
                 "[prefilter]\nfrequency_hz = 1",

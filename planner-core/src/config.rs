@@ -217,13 +217,31 @@ impl fmt::Display for SettingValue {
 impl RobotConfig {
     /// Names of all settings, in groups whose values must fit each other: lengths in mm, angles
     /// in °, the frequency in Hz, feedrates in mm/s, the yaw limit in °/s.
-    pub const GROUPS: [&'static [&'static str]; 11] = [
+    pub const GROUPS: [&'static [&'static str]; 15] = [
         &["link1", "link2"],
         &["elbow", "joint2-min", "joint2-max", "singularity-margin"],
         &["joint1-min", "joint1-max"],
         &["joint3-min", "joint3-max"],
         &["joint4-min", "joint4-max"],
-        &["prefilter", "frequency", "damping"],
+        &[
+            "prefilter",
+            "frequency",
+            "damping",
+            "v-tol",
+            "box-ms",
+            "s-curve-feed",
+            "s-curve-jerk",
+        ],
+        &["prefilter2", "frequency2", "damping2"],
+        &["smoothing1-ms", "smoothing2-ms"],
+        &[
+            "impulse1-weight",
+            "impulse2-weight",
+            "impulse3-weight",
+            "impulse4-weight",
+            "impulse5-weight",
+        ],
+        &["impulse2-ms", "impulse3-ms", "impulse4-ms", "impulse5-ms"],
         &["tolerance"],
         &["rapid"],
         &["feed-limit"],
@@ -299,8 +317,13 @@ impl RobotConfig {
 
     fn slot(&mut self, name: &str) -> Option<Slot<'_>> {
         let [joint1, joint2, joint3, joint4] = &mut self.scara.joint_limits;
+        let prefilter = &mut self.prefilter;
+        let second = &mut prefilter.second;
+        let [impulse1, impulse2, impulse3, impulse4, impulse5] = &mut prefilter.impulses;
+        let [smoothing1_ms, smoothing2_ms] = &mut prefilter.smoothing_ms;
         Some(match name {
-            "prefilter" => Slot::Prefilter(&mut self.prefilter.kind),
+            "prefilter" => Slot::Prefilter(&mut prefilter.kind),
+            "prefilter2" => Slot::Prefilter(&mut second.kind),
             "elbow" => Slot::Elbow(&mut self.scara.elbow),
             "link1" => Slot::Number(&mut self.scara.link1_mm),
             "link2" => Slot::Number(&mut self.scara.link2_mm),
@@ -313,8 +336,25 @@ impl RobotConfig {
             "joint3-max" => Slot::Number(&mut joint3.max),
             "joint4-min" => Slot::Number(&mut joint4.min),
             "joint4-max" => Slot::Number(&mut joint4.max),
-            "frequency" => Slot::Number(&mut self.prefilter.frequency_hz),
-            "damping" => Slot::Number(&mut self.prefilter.damping),
+            "frequency" => Slot::Number(&mut prefilter.frequency_hz),
+            "damping" => Slot::Number(&mut prefilter.damping),
+            "v-tol" => Slot::Number(&mut prefilter.v_tol),
+            "box-ms" => Slot::Number(&mut prefilter.box_ms),
+            "s-curve-feed" => Slot::Number(&mut prefilter.s_curve_feed_mm_s),
+            "s-curve-jerk" => Slot::Number(&mut prefilter.s_curve_jerk_mm_s3),
+            "frequency2" => Slot::Number(&mut second.frequency_hz),
+            "damping2" => Slot::Number(&mut second.damping),
+            "smoothing1-ms" => Slot::Number(smoothing1_ms),
+            "smoothing2-ms" => Slot::Number(smoothing2_ms),
+            "impulse1-weight" => Slot::Number(&mut impulse1.weight),
+            "impulse2-weight" => Slot::Number(&mut impulse2.weight),
+            "impulse3-weight" => Slot::Number(&mut impulse3.weight),
+            "impulse4-weight" => Slot::Number(&mut impulse4.weight),
+            "impulse5-weight" => Slot::Number(&mut impulse5.weight),
+            "impulse2-ms" => Slot::Number(&mut impulse2.time_ms),
+            "impulse3-ms" => Slot::Number(&mut impulse3.time_ms),
+            "impulse4-ms" => Slot::Number(&mut impulse4.time_ms),
+            "impulse5-ms" => Slot::Number(&mut impulse5.time_ms),
             "tolerance" => Slot::Number(&mut self.corner_tolerance_mm),
             "rapid" => Slot::Number(&mut self.rapid_mm_s),
             "feed-limit" => Slot::Number(&mut self.feed_limit_mm_s),
@@ -399,6 +439,14 @@ mod tests {
             ("frequency=0", "frequency"),
             ("frequency=1.5", "long"),
             ("damping=1", "damping"),
+            ("frequency2=300", "second mode's frequency"),
+            ("damping2=-1", "second mode's damping"),
+            ("v-tol=0", "residual allowed"),
+            ("box-ms=0.5", "box"),
+            ("s-curve-feed=0", "s-curve"),
+            ("smoothing2-ms=501", "smoothing"),
+            ("impulse1-weight=0", "impulse 1"),
+            ("impulse3-ms=1001", "impulse 3"),
             ("link1=-200", "link"),
         ] {
             let mut config = RobotConfig::default();

@@ -570,6 +570,7 @@ fn the_robots_words_change_what_they_name() {
         kind,
         frequency_hz,
         damping,
+        ..PrefilterConfig::default()
     };
     for (text, change) in [
         (

@@ -93,6 +93,7 @@ fn robot(kind: Kind, frequency_hz: f32) -> Robot {
             kind,
             frequency_hz,
             damping: 0.022,
+            ..PrefilterConfig::default()
         },
         ..RobotConfig::default()
     };

@@ -83,8 +83,15 @@ impl Comparison {
     /// is left out instead.
     pub fn run(scenario: &Scenario, progress: Progress) -> Result<Self> {
         let unfiltered = scenario.run_with(Kind::None, Progress::Hidden)?;
-        let bar = progress.bar("prefilters", Kind::ALL.len());
-        let next = Mutex::new(Kind::ALL.into_iter());
+        let impulses = &scenario.settings.robot.prefilter.impulses;
+        let has_list = impulses.iter().skip(1).any(|impulse| impulse.weight > 0.0);
+        // a list of one impulse is no prefilter of its own
+        let kinds = Kind::ALL.into_iter();
+        let kinds: Vec<_> = kinds
+            .filter(|kind| has_list || kind.follows_the_mode())
+            .collect();
+        let bar = progress.bar("prefilters", kinds.len());
+        let next = Mutex::new(kinds.iter().copied());
         let rows = Mutex::new(Vec::new());
         let work = || {
             loop {
@@ -100,7 +107,7 @@ impl Comparison {
         };
         let threads = thread::available_parallelism().map_or(1, usize::from);
         thread::scope(|scope| {
-            for _ in 0..threads.min(Kind::ALL.len()) {
+            for _ in 0..threads.min(kinds.len()) {
                 scope.spawn(work);
             }
         });

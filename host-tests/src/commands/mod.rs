@@ -1,5 +1,6 @@
 //! The commands of the program `stillpoint`, one a file: arguments in, sentences out.
 
+mod cascade_args;
 pub mod compare;
 pub mod corner;
 pub mod demo;
@@ -17,6 +18,7 @@ pub mod run;
 mod scenario_args;
 pub mod send;
 
+pub use cascade_args::CascadeArgs;
 pub use failure::Failure;
 pub use model_args::ModelArgs;
 pub use scenario_args::ScenarioArgs;

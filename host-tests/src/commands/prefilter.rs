@@ -7,9 +7,9 @@ use serde::Serialize;
 
 use super::ModelArgs;
 
-/// The band is where less than this is left. EI touches 5 % at the model frequency: the
-/// margin keeps rounding out of the answer.
-const BAND_LIMIT: f64 = 0.05 + 1e-9;
+/// The band is where less than `V_tol` is left, 5 % if it is not given. EI shapers touch it
+/// within the band: the margin keeps rounding out of the answer.
+const MARGIN: f64 = 1e-7;
 
 /// Arguments of `prefilter`.
 #[derive(Args, Debug)]
@@ -31,6 +31,9 @@ pub struct PrefilterArgs {
 #[derive(Serialize)]
 struct Answer {
     length_s: f64,
+    centroid_s: f64,
+    spread_s: f64,
+    boxes_s: Vec<f64>,
     residual_percent: f64,
     band_low_hz: Option<f64>,
     band_high_hz: Option<f64>,
@@ -49,9 +52,21 @@ pub fn execute(args: &PrefilterArgs) -> Result<String> {
         (Some(low), Some(high)) => format!("{low:.4} to {high:.4} Hz"),
         _ => "nowhere around the model frequency".into(),
     };
+    let boxes: Vec<_> = answer.boxes_s.iter().map(|s| format!("{s:.6} s")).collect();
+    let boxes = if boxes.is_empty() {
+        "none: the velocity jumps".into()
+    } else {
+        boxes.join(", ")
+    };
+    let limit = 100.0 * f64::from(args.model.config()?.v_tol);
+    let limit = format!("residual below {limit:.4}")
+        .trim_end_matches('0')
+        .trim_end_matches('.')
+        .to_owned();
     Ok(format!(
-        "length             {:.6} s\nresidual           {:.4} %\nresidual below 5 % {band}",
-        answer.length_s, answer.residual_percent
+        "length             {:.6} s\ncentroid           {:.6} s\nspread             {:.6} s\n\
+         boxes              {boxes}\nresidual           {:.4} %\n{limit} % {band}",
+        answer.length_s, answer.centroid_s, answer.spread_s, answer.residual_percent
     ))
 }
 
@@ -75,9 +90,13 @@ fn answer(args: &PrefilterArgs) -> Result<Answer> {
         "the robot's damping ratio of {} is not from 0 to below 1: check --actual-damping",
         actual.damping
     );
-    let band = insensitivity(&prefilter, &model, BAND_LIMIT);
+    let limit = f64::from(args.model.config()?.v_tol);
+    let band = insensitivity(&prefilter, &model, limit + MARGIN);
     Ok(Answer {
         length_s: prefilter.length_s(),
+        centroid_s: prefilter.centroid_s(),
+        spread_s: prefilter.spread_s(),
+        boxes_s: prefilter.boxes_s().to_vec(),
         residual_percent: 100.0 * residual(&prefilter, &actual),
         band_low_hz: band.map(|band| band.low_hz),
         band_high_hz: band.map(|band| band.high_hz),

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 
+use super::CascadeArgs;
 use crate::machine::Machine;
 use crate::program_file::ProgramFile;
 use crate::robot_file::RobotSettings;
@@ -25,6 +26,8 @@ pub struct ScenarioArgs {
     /// Damping ratio that the prefilter is made for.
     #[arg(long, value_name = "Z")]
     damping: Option<f32>,
+    #[command(flatten)]
+    cascade: CascadeArgs,
     /// Corner tolerance where the program sets none; 0 stops at corners.
     #[arg(long, value_name = "MM")]
     tolerance: Option<f32>,
@@ -49,6 +52,7 @@ impl ScenarioArgs {
         for (setting, flag) in flags {
             *setting = flag.unwrap_or(*setting);
         }
+        self.cascade.apply(&mut robot.prefilter)?;
         Ok(Scenario {
             program: ProgramFile::load(&self.program)?,
             settings,

@@ -12,4 +12,4 @@ pub mod prefilter;
 
 pub use corner::{Corner, CornerSolution, Leg};
 pub use path::{Geometry, Path, Schedule, Segment};
-pub use prefilter::{NAMES, Prefilter};
+pub use prefilter::{NAMES, Options, Prefilter};

@@ -2,11 +2,50 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// Names that [`Prefilter::named`] knows, by increasing length.
-pub const NAMES: [&str; 7] = ["none", "zv", "zvd", "ei", "fir", "fir-zv", "fir-zvd"];
+/// Names that [`Prefilter::named`] knows.
+pub const NAMES: [&str; 20] = [
+    "none",
+    "zv",
+    "zvd",
+    "ei",
+    "fir",
+    "fir-zv",
+    "fir-zvd",
+    "mzv",
+    "zvdd",
+    "2hump-ei",
+    "3hump-ei",
+    "s-curve",
+    "box",
+    "custom",
+    "fir-ei",
+    "fir-mzv",
+    "fir-zvdd",
+    "fir-2hump-ei",
+    "fir-3hump-ei",
+    "fir-custom",
+];
 
-/// Residual that the EI shaper allows at its nominal frequency.
-const EI_RESIDUAL: f64 = 0.05;
+/// What a name and a mode leave open.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Residual that EI shapers allow, as a fraction.
+    pub v_tol: f64,
+    /// Length of the boxes of `box` and `s-curve`; one damped period if there is none.
+    pub box_s: Option<f64>,
+    /// Times in seconds and weights of `custom`.
+    pub impulses: Vec<(f64, f64)>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            v_tol: 0.05,
+            box_s: None,
+            impulses: vec![(0.0, 1.0)],
+        }
+    }
+}
 
 /// A filter of unit area: impulses `Σ A_i δ(t − t_i)` convolved with boxes.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,29 +89,69 @@ impl Prefilter {
     /// and damping ratio `damping`; `None` for a name not in [`NAMES`].
     #[must_use]
     pub fn named(name: &str, frequency_hz: f64, damping: f64) -> Option<Self> {
+        Self::with_options(name, frequency_hz, damping, &Options::default())
+    }
+
+    /// The same with what the mode leaves open.
+    #[must_use]
+    pub fn with_options(
+        name: &str,
+        frequency_hz: f64,
+        damping: f64,
+        options: &Options,
+    ) -> Option<Self> {
         let root = (1.0 - damping * damping).sqrt();
         let period = 1.0 / (frequency_hz * root);
         let half = period / 2.0;
         let k = (-damping * PI / root).exp();
-        let none = vec![(0.0, 1.0)];
-        let zv = vec![(0.0, 1.0 / (1.0 + k)), (half, k / (1.0 + k))];
-        let square = (1.0 + k) * (1.0 + k);
-        let zvd = vec![
-            (0.0, 1.0 / square),
-            (half, 2.0 * k / square),
-            (period, k * k / square),
-        ];
-        let (impulses, boxes): (_, &[f64]) = match name {
-            "none" => (none, &[]),
-            "zv" => (zv, &[]),
-            "zvd" => (zvd, &[]),
-            "ei" => (extra_insensitive(period, k), &[]),
-            "fir" => (none, &[period]),
-            "fir-zv" => (zv, &[period]),
-            "fir-zvd" => (zvd, &[period]),
+        let spaced = |spacing: f64, decay: f64, weights: &[f64]| {
+            let list = (0_u8..).zip(weights).map(|(i, weight)| {
+                let i = f64::from(i);
+                (spacing * i, weight * decay.powf(i))
+            });
+            normalised(&list.collect::<Vec<_>>())
+        };
+        let given = options.box_s.unwrap_or(period);
+        let (shaper, boxes) = match name {
+            "fir" => ("none", vec![period]),
+            "box" => ("none", vec![given]),
+            "s-curve" => ("none", vec![given, given]),
+            _ => match name.strip_prefix("fir-") {
+                Some(shaper) => (shaper, vec![period]),
+                None => (name, vec![]),
+            },
+        };
+        let impulses = match shaper {
+            "none" => vec![(0.0, 1.0)],
+            "zv" => spaced(half, k, &[1.0, 1.0]),
+            "zvd" => spaced(half, k, &[1.0, 2.0, 1.0]),
+            "zvdd" => spaced(half, k, &[1.0, 3.0, 3.0, 1.0]),
+            "mzv" => modified_zv(frequency_hz, damping),
+            "ei" => extra_insensitive(period, k, options.v_tol),
+            "2hump-ei" => highest_hump(options.v_tol, |v| spaced(half, k, &two_humps(v)), damping),
+            "3hump-ei" => {
+                highest_hump(options.v_tol, |v| spaced(half, k, &three_humps(v)), damping)
+            }
+            "custom" => normalised(&options.impulses),
             _ => return None,
         };
-        Some(Self::new(&impulses, boxes))
+        Some(Self::new(&impulses, &boxes))
+    }
+
+    /// One after the other.
+    #[must_use]
+    pub fn cascade(parts: &[Self]) -> Self {
+        let mut impulses = vec![(0.0, 1.0)];
+        let mut boxes_s = Vec::new();
+        for part in parts {
+            let pairs = impulses.iter().flat_map(|&(t, a)| {
+                let moved = part.impulses.iter();
+                moved.map(move |&(later, share)| (t + later, a * share))
+            });
+            impulses = pairs.collect();
+            boxes_s.extend(&part.boxes_s);
+        }
+        Self::new(&impulses, &boxes_s)
     }
 
     /// Times in seconds and amplitudes of its impulses.
@@ -92,6 +171,16 @@ impl Prefilter {
     pub fn centroid_s(&self) -> f64 {
         let impulses: f64 = self.impulses.iter().map(|&(t, a)| t * a).sum();
         impulses + self.boxes_s.iter().sum::<f64>() / 2.0
+    }
+
+    /// Variance of the impulse response in s²: the second moment about the centroid, of all
+    /// impulses at once and of each box.
+    #[must_use]
+    pub fn variance_s2(&self) -> f64 {
+        let mean: f64 = self.impulses.iter().map(|&(t, a)| t * a).sum();
+        let square: f64 = self.impulses.iter().map(|&(t, a)| t * t * a).sum();
+        let boxes: f64 = self.boxes_s.iter().map(|length| length * length).sum();
+        square - mean * mean + boxes / 12.0
     }
 
     /// Times at which the step response jumps or has a kink, in order.
@@ -195,23 +284,99 @@ impl Prefilter {
     }
 }
 
+/// Divided by the sum of the weights.
+fn normalised(list: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let sum: f64 = list.iter().map(|&(_, weight)| weight).sum();
+    list.iter().map(|&(t, weight)| (t, weight / sum)).collect()
+}
+
+/// MZV: three impulses, three eighths of a damped period apart, whose transform
+/// `(1 − q/q₀)(1 − q/q̄₀)` vanishes at the mode's pole, `q = e^{−pτ}`.
+fn modified_zv(frequency_hz: f64, damping: f64) -> Vec<(f64, f64)> {
+    let omega = TAU * frequency_hz;
+    let damped = omega * (1.0 - damping * damping).sqrt();
+    let spacing = 0.375 * TAU / damped;
+    let size = (damping * omega * spacing).exp();
+    let real = (damped * spacing).cos() / size;
+    normalised(&[
+        (0.0, 1.0),
+        (spacing, -2.0 * real),
+        (2.0 * spacing, 1.0 / (size * size)),
+    ])
+}
+
 /// EI for a damped mode: ratios `(1+v)/4 : (1−v)/2·K : (1+v)/4·K²` leave
 /// `V = v K² / (c0 + v c1)` at the nominal mode, solved here for `v`.
-fn extra_insensitive(period_s: f64, k: f64) -> Vec<(f64, f64)> {
+fn extra_insensitive(period_s: f64, k: f64, v_tol: f64) -> Vec<(f64, f64)> {
     let c0 = (1.0 + k).powi(2) / 4.0;
     let c1 = (1.0 - k).powi(2) / 4.0;
-    let v = EI_RESIDUAL * c0 / (k * k - EI_RESIDUAL * c1);
-    let raw = [
-        (1.0 + v) / 4.0,
-        (1.0 - v) / 2.0 * k,
-        (1.0 + v) / 4.0 * k * k,
-    ];
-    let sum: f64 = raw.iter().sum();
-    vec![
-        (0.0, raw[0] / sum),
-        (period_s / 2.0, raw[1] / sum),
-        (period_s, raw[2] / sum),
-    ]
+    let v = v_tol * c0 / (k * k - v_tol * c1);
+    normalised(&[
+        (0.0, (1.0 + v) / 4.0),
+        (period_s / 2.0, (1.0 - v) / 2.0 * k),
+        (period_s, (1.0 + v) / 4.0 * k * k),
+    ])
+}
+
+/// Undamped amplitudes of the 2-hump EI shaper, as printed in the literature.
+fn two_humps(v: f64) -> [f64; 4] {
+    let x = (v * v * ((1.0 - v * v).sqrt() + 1.0)).cbrt();
+    let a = (3.0 * x * x + 2.0 * x + 3.0 * v * v) / (16.0 * x);
+    [a, 0.5 - a, 0.5 - a, a]
+}
+
+/// Undamped amplitudes of the 3-hump EI shaper, likewise.
+fn three_humps(v: f64) -> [f64; 5] {
+    let a = (1.0 + 3.0 * v + 2.0 * (2.0 * v * (v + 1.0)).sqrt()) / 16.0;
+    let b = (1.0 - v) / 4.0;
+    [a, b, 1.0 - 2.0 * (a + b), b, a]
+}
+
+/// The shaper whose highest hump is `v_tol`, found by halving the interval of its parameter;
+/// the hump by looking along the frequencies. With a damping ratio of more than 0.1 the hump
+/// may drown in the skirt of the band.
+fn highest_hump(
+    v_tol: f64,
+    shaper: impl Fn(f64) -> Vec<(f64, f64)>,
+    damping: f64,
+) -> Vec<(f64, f64)> {
+    let height = |v: f64| {
+        let filter = Prefilter::new(&shaper(v), &[]);
+        let nominal_hz = 1.5 / filter.length_s() / (1.0 - damping * damping).sqrt();
+        let nominal_hz = if filter.impulses.len() == 5 {
+            nominal_hz * 4.0 / 3.0
+        } else {
+            nominal_hz
+        };
+        let left = |ratio: f64| filter.residual(nominal_hz * ratio, damping);
+        let mut highest = 0.0_f64;
+        for ratio in (80_i32..320).map(|step| f64::from(step) / 200.0) {
+            if left(ratio) >= left(ratio - 0.005) && left(ratio) > left(ratio + 0.005) {
+                // a top within two steps: thirds of the interval that cannot hold it go
+                let (mut from, mut to) = (ratio - 0.005, ratio + 0.005);
+                for _ in 0..30 {
+                    let third = (to - from) / 3.0;
+                    if left(from + third) < left(to - third) {
+                        from += third;
+                    } else {
+                        to -= third;
+                    }
+                }
+                highest = highest.max(left(from));
+            }
+        }
+        highest
+    };
+    let (mut low, mut high) = (1e-4, 0.999);
+    for _ in 0..40 {
+        let middle = f64::midpoint(low, high);
+        *(if height(middle) < v_tol {
+            &mut low
+        } else {
+            &mut high
+        }) = middle;
+    }
+    shaper(low)
 }
 
 #[cfg(test)]
@@ -297,11 +462,14 @@ mod tests {
     #[test]
     fn lengths_are_those_of_the_model() {
         let period = 1.0 / (6.34 * (1.0_f64 - 0.022 * 0.022).sqrt());
-        let lengths = [0.0, 0.5, 1.0, 1.0, 1.0, 1.5, 2.0];
+        let lengths = [
+            0.0, 0.5, 1.0, 1.0, 1.0, 1.5, 2.0, 0.75, 1.5, 1.5, 2.0, 2.0, 1.0, 0.0, 2.0, 1.75, 2.5,
+            2.5, 3.0, 1.0,
+        ];
         for (name, expected) in NAMES.into_iter().zip(lengths) {
             let filter = Prefilter::named(name, 6.34, 0.022).unwrap();
             close(filter.length_s(), expected * period, 1e-15);
         }
-        assert!(Prefilter::named("fir-zvdd", 6.34, 0.022).is_none());
+        assert!(Prefilter::named("fir-zvddd", 6.34, 0.022).is_none());
     }
 }

@@ -157,6 +157,7 @@ fn the_prefilter_changes_where_the_program_says() {
         kind: Kind::FirZv,
         frequency_hz: 11.0,
         damping: 0.05,
+        ..PrefilterConfig::default()
     };
     let (first, second) = (robot(|_| {}), robot(|config| config.prefilter = other));
     let onward = "G1 X200 Y30 F9600\nG2 X180 Y10 I-20 J0\nM2";

@@ -147,6 +147,7 @@ fn a_forgotten_change_of_the_prefilter_is_made_all_the_same() {
         kind: Kind::Zv,
         frequency_hz: 9.0,
         damping: 0.1,
+        ..PrefilterConfig::default()
     };
     let robot_before = robot(|_| {});
     let robot_after = robot(|config| config.prefilter = other);

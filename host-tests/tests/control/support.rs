@@ -85,9 +85,10 @@ pub fn report(robot: &Robot, program: &str, setpoints: &[Setpoint]) -> Report {
 /// How far a polyline of samples may cut a path on which the velocity jumps by twice the
 /// feedrate: half of what the tool travels in a tick. A box makes that a micrometre.
 pub fn allowance_mm(kind: Kind, feed_mm_s: f64) -> f64 {
-    match kind {
-        Kind::None | Kind::Zv | Kind::Zvd | Kind::Ei => feed_mm_s * TICK_S / 2.0,
-        Kind::Fir | Kind::FirZv | Kind::FirZvd => 1e-3,
+    if kind.lets_velocity_jump() {
+        feed_mm_s * TICK_S / 2.0
+    } else {
+        1e-3
     }
 }
 

@@ -42,6 +42,7 @@ fn prefilter_change(block: &mut Block) -> Result<Option<RobotChange>, Error> {
         kind: kind.unwrap_or(before.kind),
         frequency_hz: frequency_hz.unwrap_or(before.frequency_hz),
         damping: damping.unwrap_or(before.damping),
+        ..before
     };
     block.modal.prefilter = prefilter;
     Ok((prefilter != before).then_some(RobotChange::Prefilter(prefilter)))

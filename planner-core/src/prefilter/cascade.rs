@@ -2,57 +2,24 @@
 
 use heapless::Vec;
 
-use super::{EI_RESIDUAL, Kind, Mode, PrefilterConfig, PrefilterError, Response};
+use super::kind::{Boxes, Shaper};
+use super::{Impulse, Impulses, Kind, Mode, PrefilterConfig, PrefilterError, Response, SecondMode};
 
-/// Stages in a cascade: FIR-ZVD has three.
-pub const MAX_STAGES: usize = 4;
-
-/// One impulse `A δ(t − t_i)` of a shaper.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Impulse {
-    /// When, in seconds from the stage's input.
-    pub time_s: f64,
-    /// Its amplitude; a shaper's amplitudes are positive and sum to 1.
-    pub amplitude: f64,
-}
+/// Stages in a cascade: FIR-ZVDD for two modes has eight, and one more delays.
+pub const MAX_STAGES: usize = 9;
 
 /// One stage of a cascade; each has unit area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stage {
     /// ZV shaper for a mode: `[1, K] / (1 + K)` at `0, T_d/2`.
     Zv(Mode),
-    /// A shaper given by three impulses, the first at zero.
-    Impulses([Impulse; 3]),
+    /// A shaper given by its impulses.
+    Impulses(Impulses),
     /// A box `1/T` on `[0, T]`, `T` in seconds: a moving average.
     Box(f64),
 }
 
 impl Stage {
-    /// EI shaper: three impulses at `0, T_d/2, T_d` that leave `residual` of a step's
-    /// vibration at the nominal mode.
-    ///
-    /// ```text
-    /// A = [(1+v)/4, (1−v)/2 K, (1+v)/4 K²] / Σ,   residual V = v K² / Σ
-    /// Σ = c0 + c1 v,  c0 = (1+K)²/4,  c1 = (1−K)²/4   ⇒   v = V c0 / (K² − V c1)
-    /// ```
-    /// Source: Singhose, Seering, Singer: residual vibration reduction using vector diagrams
-    /// to generate shaped inputs, 1994; `v` solved so that the residual holds with damping.
-    #[must_use]
-    pub fn extra_insensitive(mode: &Mode, residual: f64) -> Self {
-        let k = mode.half_period_decay();
-        let c0 = (1.0 + k) * (1.0 + k) / 4.0;
-        let c1 = (1.0 - k) * (1.0 - k) / 4.0;
-        let v = residual * c0 / (k * k - residual * c1);
-        let sum = c0 + c1 * v;
-        let period_s = mode.damped_period_s();
-        let at = |time_s, amplitude| Impulse { time_s, amplitude };
-        Self::Impulses([
-            at(0.0, (1.0 + v) / 4.0 / sum),
-            at(period_s / 2.0, (1.0 - v) / 2.0 * k / sum),
-            at(period_s, (1.0 + v) / 4.0 * k * k / sum),
-        ])
-    }
-
     /// The stage's length in seconds.
     #[must_use]
     pub fn length_s(&self) -> f64 {
@@ -63,26 +30,35 @@ impl Stage {
         }
     }
 
-    /// The stage's impulses; none for a box.
-    pub(super) fn impulses(&self) -> Vec<Impulse, 3> {
+    /// The mean of the stage's weight over time in seconds.
+    fn mean_s(&self) -> f64 {
         match self {
-            Self::Zv(mode) => {
-                let k = mode.half_period_decay();
-                Vec::from_iter([
-                    Impulse {
-                        time_s: 0.0,
-                        amplitude: 1.0 / (1.0 + k),
-                    },
-                    Impulse {
-                        time_s: mode.damped_period_s() / 2.0,
-                        amplitude: k / (1.0 + k),
-                    },
-                ])
-            }
-            Self::Impulses(list) => list.iter().copied().collect(),
-            Self::Box(_) => Vec::new(),
+            Self::Box(length_s) => length_s / 2.0,
+            Self::Zv(mode) => mean_s(&Impulses::zv(mode)),
+            Self::Impulses(list) => mean_s(list),
         }
     }
+
+    /// The variance of the stage's weight over time in s²: `T²/12` of a box,
+    /// `Σ A t² − (Σ A t)²` of impulses.
+    pub(super) fn variance_s2(&self) -> f64 {
+        match self {
+            Self::Box(length_s) => length_s * length_s / 12.0,
+            Self::Zv(mode) => variance_s2(&Impulses::zv(mode)),
+            Self::Impulses(list) => variance_s2(list),
+        }
+    }
+}
+
+fn mean_s(impulses: &Impulses) -> f64 {
+    impulses.iter().map(|i| i.amplitude * i.time_s).sum()
+}
+
+fn variance_s2(impulses: &Impulses) -> f64 {
+    // squares of what is left of the mean: no difference of large numbers
+    let mean_s = mean_s(impulses);
+    let from_mean = |i: &Impulse| (i.time_s - mean_s) * (i.time_s - mean_s);
+    impulses.iter().map(|i| i.amplitude * from_mean(i)).sum()
 }
 
 /// A prefilter: a cascade of stages, shapers first and boxes last.
@@ -95,40 +71,118 @@ pub struct Prefilter {
 }
 
 impl Prefilter {
-    /// The prefilter that the settings describe.
+    /// The prefilter that the settings describe: one cascade for each mode, and smoothing.
     ///
     /// # Errors
     /// [`PrefilterError`] names the setting that is out of range.
     pub fn new(config: &PrefilterConfig) -> Result<Self, PrefilterError> {
-        let PrefilterConfig {
-            kind,
-            frequency_hz,
-            damping,
-        } = *config;
-        if !(0.01..=250.0).contains(&frequency_hz) {
-            return Err(PrefilterError::Frequency { frequency_hz });
-        }
-        if !(0.0..=0.5).contains(&damping) {
-            return Err(PrefilterError::Damping { damping });
-        }
-        let mode = Mode {
-            frequency_hz: f64::from(frequency_hz),
-            damping: f64::from(damping),
+        config.check()?;
+        let mode = |frequency_hz: f32, damping: f32| Mode {
+            frequency_hz: frequency_hz.into(),
+            damping: damping.into(),
         };
-        let zv = Stage::Zv(mode);
-        let fir = Stage::Box(mode.damped_period_s());
-        let stages: &[Stage] = match kind {
-            Kind::None => &[],
-            Kind::Zv => &[zv],
-            Kind::Zvd => &[zv, zv],
-            Kind::Ei => &[Stage::extra_insensitive(&mode, EI_RESIDUAL)],
-            Kind::Fir => &[fir],
-            Kind::FirZv => &[zv, fir],
-            Kind::FirZvd => &[zv, zv, fir],
+        let first = mode(config.frequency_hz, config.damping);
+        let second = (config.second.frequency_hz > 0.0).then(|| {
+            let SecondMode {
+                kind,
+                frequency_hz,
+                damping,
+            } = config.second;
+            (kind, mode(frequency_hz, damping))
+        });
+        let parts = || core::iter::once((config.kind, first)).chain(second);
+        let mut prefilter = Self { stages: Vec::new() };
+        for (kind, mode) in parts() {
+            prefilter.push_shaper(config, kind, &mode)?;
+        }
+        for (kind, mode) in parts() {
+            prefilter.push_boxes(config, kind, &mode)?;
+        }
+        prefilter.with_smoothing(
+            config
+                .smoothing_ms
+                .map(|length_ms| f64::from(length_ms) / 1e3),
+        )
+    }
+
+    fn push_shaper(
+        &mut self,
+        config: &PrefilterConfig,
+        kind: Kind,
+        mode: &Mode,
+    ) -> Result<(), PrefilterError> {
+        let v_tol = f64::from(config.v_tol);
+        let impulses = match kind.parts().0 {
+            Shaper::None => return Ok(()),
+            Shaper::Zv(times) => return (0..times).try_for_each(|_| self.push(Stage::Zv(*mode))),
+            Shaper::Mzv => Impulses::mzv(mode),
+            Shaper::Ei => Impulses::extra_insensitive(mode, v_tol),
+            Shaper::TwoHumpEi => Impulses::two_hump_ei(mode, v_tol),
+            Shaper::ThreeHumpEi => Impulses::three_hump_ei(mode, v_tol),
+            Shaper::Custom => Impulses::custom(&config.impulses),
         };
-        Ok(Self {
-            stages: stages.iter().copied().collect(),
-        })
+        self.push(Stage::Impulses(impulses))
+    }
+
+    fn push_boxes(
+        &mut self,
+        config: &PrefilterConfig,
+        kind: Kind,
+        mode: &Mode,
+    ) -> Result<(), PrefilterError> {
+        let period_s = mode.damped_period_s();
+        let given_s = if config.box_ms > 0.0 {
+            f64::from(config.box_ms) / 1e3
+        } else {
+            period_s
+        };
+        match kind.parts().1 {
+            Boxes::None => Ok(()),
+            Boxes::Period => self.push(Stage::Box(period_s)),
+            Boxes::Box => self.push(Stage::Box(given_s)),
+            Boxes::SCurve => {
+                let length_s = s_curve_box_s(config)?.unwrap_or(given_s);
+                self.push(Stage::Box(length_s))?;
+                self.push(Stage::Box(length_s))
+            }
+        }
+    }
+
+    /// Adds a stage at its place: shapers first, then boxes, the shorter ones first.
+    fn push(&mut self, stage: Stage) -> Result<(), PrefilterError> {
+        let rank = |stage: &Stage| match stage {
+            Stage::Box(length_s) => *length_s,
+            Stage::Zv(_) | Stage::Impulses(_) => 0.0,
+        };
+        let place = self
+            .stages
+            .iter()
+            .take_while(|other| rank(other) <= rank(&stage))
+            .count();
+        self.stages
+            .insert(place, stage)
+            .map_err(|_| PrefilterError::TooManyKinks)
+    }
+
+    /// The same with boxes that keep the feedrate from jumping, in seconds, 0 for none: the
+    /// first is that of a cascade without a box, the second that of one with fewer than two.
+    ///
+    /// A feedrate `F` then accelerates by at most `F/T1`, with a jerk of at most `F/(T1 T2)`,
+    /// `T1` and `T2` being the first of [`Prefilter::boxes_s`].
+    ///
+    /// # Errors
+    /// [`PrefilterError::TooManyKinks`] if there is no room for another box in the response.
+    pub fn with_smoothing(mut self, boxes_s: [f64; 2]) -> Result<Self, PrefilterError> {
+        for (enough, length_s) in (1..).zip(boxes_s) {
+            if length_s > 0.0 && self.boxes_s().len() < enough {
+                self.push(Stage::Box(length_s))?;
+            }
+        }
+        if Response::has_room_for(&self.stages) {
+            Ok(self)
+        } else {
+            Err(PrefilterError::TooManyKinks)
+        }
     }
 
     /// Two boxes in cascade, given by their lengths in seconds: a second-order moving average,
@@ -168,15 +222,60 @@ impl Prefilter {
         Response::new(&self.stages, true)
     }
 
-    /// The longest box in seconds; none in a pure shaper, which lets the velocity jump.
+    /// The lengths of the boxes in seconds, the longest first; none in a pure shaper.
+    ///
+    /// A feedrate `F` through boxes `T1 ≥ T2` accelerates by at most `F/T1`, with a jerk of at
+    /// most `F/(T1 T2)`: shapers, whose weights are positive and sum to 1, make neither larger.
     #[must_use]
-    pub fn longest_box_s(&self) -> Option<f64> {
-        self.stages
+    pub fn boxes_s(&self) -> Vec<f64, MAX_STAGES> {
+        let mut boxes_s: Vec<f64, MAX_STAGES> = self
+            .stages
             .iter()
             .filter_map(|stage| match stage {
                 Stage::Box(length_s) => Some(*length_s),
                 _ => None,
             })
-            .reduce(f64::max)
+            .collect();
+        boxes_s.sort_unstable_by(|one, other| other.total_cmp(one));
+        boxes_s
+    }
+
+    /// The longest box in seconds; none in a pure shaper, which lets the velocity jump.
+    #[must_use]
+    pub fn longest_box_s(&self) -> Option<f64> {
+        self.boxes_s().first().copied()
+    }
+
+    /// `m`, the mean delay of the prefilter in seconds: half a box's length, `Σ A t` of impulses.
+    #[must_use]
+    pub fn centroid_s(&self) -> f64 {
+        self.stages.iter().map(Stage::mean_s).sum()
+    }
+
+    /// `σ`, the standard deviation of the prefilter's weight over time, in seconds: a path of
+    /// curvature `κ` at a feedrate `F` is cut by about `F² κ σ²/2`.
+    ///
+    /// The variances of the stages add up.
+    #[must_use]
+    pub fn spread_s(&self) -> f64 {
+        libm::sqrt(self.stages.iter().map(Stage::variance_s2).sum())
+    }
+}
+
+/// `T_rr = √(F/J)`, the boxes of an S-curve that reaches a feedrate `F` with a jerk `J`
+/// [Li23]; none without a jerk.
+fn s_curve_box_s(config: &PrefilterConfig) -> Result<Option<f64>, PrefilterError> {
+    let (feed_mm_s, jerk_mm_s3) = (config.s_curve_feed_mm_s, config.s_curve_jerk_mm_s3);
+    if jerk_mm_s3 == 0.0 {
+        return Ok(None);
+    }
+    let length_s = libm::sqrt(f64::from(feed_mm_s) / f64::from(jerk_mm_s3));
+    if (0.001..=0.5).contains(&length_s) {
+        Ok(Some(length_s))
+    } else {
+        Err(PrefilterError::SCurve {
+            feed_mm_s,
+            jerk_mm_s3,
+        })
     }
 }

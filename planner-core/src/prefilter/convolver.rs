@@ -69,8 +69,10 @@ impl<const AXES: usize> Convolver<AXES> {
                 rest: &self.rest,
             };
             total = match &stage.taps {
-                Taps::Zv(taps) => delayed.weighted(taps, [0; AXES]),
-                Taps::Impulses(taps) => delayed.weighted(taps, [0; AXES]),
+                Taps::Two(taps) => delayed.weighted(taps, [0; AXES]),
+                Taps::Three(taps) => delayed.weighted(taps, [0; AXES]),
+                Taps::Four(taps) => delayed.weighted(taps, [0; AXES]),
+                Taps::Five(taps) => delayed.weighted(taps, [0; AXES]),
                 Taps::Box(taps) => {
                     *sums = delayed.weighted(taps, *sums);
                     *sums

@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::{Impulse, MAX_STAGES, Mode, Prefilter, PrefilterError, Stage};
+use super::{Impulse, Impulses, MAX_STAGES, Mode, Prefilter, PrefilterError, Stage};
 use crate::raw::{ONE_TICK, TickTime, tick_time};
 use crate::units::{TICK_HZ, TICK_S};
 
@@ -12,6 +12,9 @@ pub const SLOTS: usize = 1024;
 
 /// Weights count in 2^-30; those of a stage sum to exactly 2^30.
 pub(super) const WEIGHT_BITS: u32 = 30;
+
+/// A box of so many seconds averages away what the ticks make of a stop between them.
+const LONG_BOX_S: f64 = 16.0 * TICK_S;
 
 const ONE: f64 = (1_i64 << WEIGHT_BITS) as f64;
 
@@ -29,10 +32,14 @@ pub(super) struct Tap {
 /// The taps of one stage.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Taps {
-    /// ZV: at zero, and half a period split over two ticks.
-    Zv([Tap; 3]),
-    /// Three impulses, the second and third split over two ticks.
-    Impulses([Tap; 5]),
+    /// Two impulses: at zero, and one split over two ticks.
+    Two([Tap; 3]),
+    /// Three impulses, all but the first split over two ticks.
+    Three([Tap; 5]),
+    /// Four impulses, likewise.
+    Four([Tap; 7]),
+    /// Five impulses, likewise.
+    Five([Tap; 9]),
     /// A box: its output's change, to be summed up.
     Box([Tap; 5]),
 }
@@ -50,8 +57,10 @@ impl StageTaps {
     /// The taps as a list.
     pub fn list(&self) -> &[Tap] {
         match &self.taps {
-            Taps::Zv(taps) => taps,
-            Taps::Impulses(taps) | Taps::Box(taps) => taps,
+            Taps::Two(taps) => taps,
+            Taps::Three(taps) | Taps::Box(taps) => taps,
+            Taps::Four(taps) => taps,
+            Taps::Five(taps) => taps,
         }
     }
 }
@@ -80,7 +89,7 @@ pub struct Kernel {
     length_ticks: u16,
     delay_ticks: u16,
     length: TickTime,
-    is_pure_shaper: bool,
+    has_long_box: bool,
 }
 
 impl Kernel {
@@ -105,8 +114,13 @@ impl Kernel {
                 weight,
             };
             let taps = match stage {
-                Stage::Zv(mode) => Taps::Zv(zv_weights(mode).map(tap)),
-                Stage::Impulses(list) => Taps::Impulses(impulse_weights(list).map(tap)),
+                Stage::Zv(mode) => Taps::Two(zv_weights(mode).map(tap)),
+                Stage::Impulses(list) => match list.len() {
+                    0..=2 => Taps::Two(impulse_weights(list).map(tap)),
+                    3 => Taps::Three(impulse_weights(list).map(tap)),
+                    4 => Taps::Four(impulse_weights(list).map(tap)),
+                    _ => Taps::Five(impulse_weights(list).map(tap)),
+                },
                 Stage::Box(length_s) => Taps::Box(box_changes(*length_s).map(tap)),
             };
             let stage = StageTaps { first_slot, taps };
@@ -123,7 +137,7 @@ impl Kernel {
             length_ticks: first_slot,
             delay_ticks: delays,
             length: tick_time(prefilter.length_s()),
-            is_pure_shaper: prefilter.longest_box_s().is_none(),
+            has_long_box: prefilter.longest_box_s().unwrap_or(0.0) >= LONG_BOX_S,
         })
     }
 
@@ -135,15 +149,15 @@ impl Kernel {
 
     /// How long the raw path stands at an exact stop, when it arrives `until_tick` before a tick.
     ///
-    /// `T_h`; for a pure shaper long enough that its last impulse, which is split over two
-    /// ticks, is over at the first tick on the next segment: until then the output is not
-    /// quite at the corner.
+    /// `T_h`; without a box of [`LONG_BOX_S`] long enough that the last impulse, which is split
+    /// over two ticks, is over at the first tick on the next segment: until then the output is
+    /// not quite at the corner.
     #[must_use]
     pub fn stop_time(&self, until_tick: TickTime) -> TickTime {
-        let split = if self.is_pure_shaper {
-            until_tick + ONE_TICK * (TickTime::from(self.delay_ticks) - 1)
-        } else {
+        let split = if self.has_long_box {
             0
+        } else {
+            until_tick + ONE_TICK * (TickTime::from(self.delay_ticks) - 1)
         };
         split.max(self.length)
     }
@@ -199,8 +213,9 @@ fn zv_weights(mode: &Mode) -> [(u16, i32); 3] {
     rounded([(0, w0 / sum), (d, w1 / sum), (d + 1, w2 / sum)])
 }
 
-/// The first impulse at zero, the others split linearly over two ticks.
-fn impulse_weights([first, second, third]: &[Impulse; 3]) -> [(u16, i32); 5] {
+/// The first impulse at zero, the others split linearly over two ticks; taps that are left
+/// over weigh nothing.
+fn impulse_weights<const TAPS: usize>(impulses: &Impulses) -> [(u16, i32); TAPS] {
     let split = |impulse: &Impulse| {
         let ticks = impulse.time_s * f64::from(TICK_HZ);
         let whole = libm::floor(ticks);
@@ -208,8 +223,16 @@ fn impulse_weights([first, second, third]: &[Impulse; 3]) -> [(u16, i32); 5] {
         let delay = whole as u16;
         [(delay, impulse.amplitude - late), (delay + 1, late)]
     };
-    let ([a, b], [c, d]) = (split(second), split(third));
-    rounded([(0, first.amplitude), a, b, c, d])
+    let first = impulses.first().map_or(1.0, |impulse| impulse.amplitude);
+    let later = impulses.iter().skip(1).flat_map(split);
+    let mut weights = [(0, 0.0); TAPS];
+    for (place, weight) in weights
+        .iter_mut()
+        .zip(core::iter::once((0, first)).chain(later))
+    {
+        *place = weight;
+    }
+    rounded(weights)
 }
 
 /// The weights of a box's changes, `y[n] − y[n−1]`: differences of its weights at delays
@@ -237,7 +260,7 @@ fn box_changes(length_s: f64) -> [(u16, i32); 5] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Kind, PrefilterConfig, residual};
+    use super::super::{Kind, PrefilterConfig, SecondMode, residual};
     use super::*;
     use proptest::prelude::*;
     use std::vec::Vec as StdVec;
@@ -282,6 +305,7 @@ mod tests {
             kind,
             frequency_hz,
             damping,
+            ..PrefilterConfig::default()
         })
         .unwrap()
     }
@@ -289,7 +313,7 @@ mod tests {
     proptest! {
         #[test]
         fn weights_sum_to_one_and_no_shaper_weight_is_negative(
-            kind in 0..Kind::ALL.len(), frequency in 2.5_f32..60.0, damping in 0.0_f32..0.3
+            kind in 0..Kind::ALL.len(), frequency in 3.2_f32..60.0, damping in 0.0_f32..0.3
         ) {
             let kernel = Kernel::new(&prefilter(Kind::ALL[kind], frequency, damping)).unwrap();
             for stage in &kernel.stages {
@@ -323,7 +347,7 @@ mod tests {
 
         #[test]
         fn the_sampled_filter_leaves_what_the_continuous_one_leaves(
-            kind in 1..Kind::ALL.len(), frequency in 2.5_f32..40.0, damping in 0.0_f32..0.1,
+            kind in 1..Kind::ALL.len(), frequency in 3.2_f32..40.0, damping in 0.0_f32..0.1,
             ratio in 0.6_f64..1.6
         ) {
             let prefilter = prefilter(Kind::ALL[kind], frequency, damping);
@@ -339,6 +363,33 @@ mod tests {
             let bound = prefilter.stages().len() as f64 * turn * turn / 8.0;
             prop_assert!(gap.abs() < bound + 1e-6, "{gap} of {bound}");
         }
+    }
+
+    #[test]
+    fn the_longest_cascade_fits() {
+        // eight stages of two modes, 1 s long; each stage adds its fractions of a tick
+        let both = |frequency_hz| {
+            Prefilter::new(&PrefilterConfig {
+                kind: Kind::FirZvdd,
+                frequency_hz,
+                damping: 0.0,
+                second: SecondMode {
+                    kind: Kind::FirZvdd,
+                    frequency_hz: 10.0,
+                    damping: 0.0,
+                },
+                ..PrefilterConfig::default()
+            })
+            .unwrap()
+        };
+        let longest = both(10.0 / 3.0);
+        assert!((longest.length_s() - 1.0).abs() < 1e-6);
+        assert_eq!(longest.stages().len(), MAX_STAGES - 1);
+        assert!(Kernel::new(&longest).is_ok());
+        assert!(matches!(
+            Kernel::new(&both(3.2)),
+            Err(PrefilterError::TooLong { .. })
+        ));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! How much vibration a prefilter leaves.
 
-use super::{Mode, Prefilter, Stage};
+use super::{Impulses, Mode, Prefilter, Stage};
 
 /// A complex number, as far as a residual needs one.
 #[derive(Clone, Copy)]
@@ -55,19 +55,23 @@ pub fn residual(prefilter: &Prefilter, mode: &Mode) -> f64 {
                     im: -omega / size,
                 })
             }
-            shaper => {
-                let mut sum = Complex { re: 0.0, im: 0.0 };
-                for impulse in &shaper.impulses() {
-                    let turn = Complex::exp(decay * impulse.time_s, -omega * impulse.time_s);
-                    sum.re += impulse.amplitude * turn.re;
-                    sum.im += impulse.amplitude * turn.im;
-                }
-                sum
-            }
+            Stage::Zv(shaped) => transform(&Impulses::zv(shaped), decay, omega),
+            Stage::Impulses(list) => transform(list, decay, omega),
         };
         response = response.times(factor);
     }
     libm::hypot(response.re, response.im) * libm::exp(-decay * prefilter.length_s())
+}
+
+/// `Σ A_i e^{−s t_i}` at `s = −decay + j omega`.
+fn transform(impulses: &Impulses, decay: f64, omega: f64) -> Complex {
+    let mut sum = Complex { re: 0.0, im: 0.0 };
+    for impulse in impulses.iter() {
+        let turn = Complex::exp(decay * impulse.time_s, -omega * impulse.time_s);
+        sum.re += impulse.amplitude * turn.re;
+        sum.im += impulse.amplitude * turn.im;
+    }
+    sum
 }
 
 /// A band of frequencies in Hz.
@@ -83,7 +87,7 @@ pub struct Band {
 /// (insensitivity), if the nominal frequency itself is in such a band.
 ///
 /// For EI, whose residual touches the limit at the nominal frequency, give a limit slightly
-/// above [`super::EI_RESIDUAL`]. Edges are good to 1e-6 of the nominal frequency. The search
+/// above its `V_tol`. Edges are good to 1e-6 of the nominal frequency. The search
 /// covers a quarter to four times the nominal frequency.
 #[must_use]
 pub fn insensitivity(prefilter: &Prefilter, nominal: &Mode, limit: f64) -> Option<Band> {
@@ -130,13 +134,17 @@ mod tests {
         damping: 0.1,
     };
 
-    fn prefilter(kind: Kind, damping: f32) -> Prefilter {
-        let config = PrefilterConfig {
+    fn config(kind: Kind, damping: f32) -> PrefilterConfig {
+        PrefilterConfig {
             kind,
             frequency_hz: 1.0,
             damping,
-        };
-        Prefilter::new(&config).unwrap()
+            ..PrefilterConfig::default()
+        }
+    }
+
+    fn prefilter(kind: Kind, damping: f32) -> Prefilter {
+        Prefilter::new(&config(kind, damping)).unwrap()
     }
 
     #[test]
@@ -187,13 +195,97 @@ mod tests {
 
     #[test]
     fn ei_leaves_what_it_is_told_to() {
-        for damping in [0.0_f32, 0.022, 0.1, 0.3] {
+        for v_tol in [0.02_f32, 0.05, 0.1] {
+            for damping in [0.0_f32, 0.022, 0.1, 0.3] {
+                let mode = Mode {
+                    damping: damping.into(),
+                    ..MODE
+                };
+                let ei = Prefilter::new(&PrefilterConfig {
+                    v_tol,
+                    ..config(Kind::Ei, damping)
+                });
+                let left = residual(&ei.unwrap(), &mode);
+                assert!((left - f64::from(v_tol)).abs() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn highest_hump_is_the_residual_allowed() {
+        for (kind, humps) in [(Kind::TwoHumpEi, 2), (Kind::ThreeHumpEi, 3)] {
+            for (v_tol, damping) in [
+                (0.02_f32, 0.0_f32),
+                (0.02, 0.1),
+                (0.05, 0.0),
+                (0.05, 0.022),
+                (0.05, 0.1),
+                (0.1, 0.022),
+            ] {
+                let prefilter = Prefilter::new(&PrefilterConfig {
+                    v_tol,
+                    ..config(kind, damping)
+                })
+                .unwrap();
+                let left = |step: i32| {
+                    let mode = Mode {
+                        frequency_hz: f64::from(step) / 1e5,
+                        damping: damping.into(),
+                    };
+                    residual(&prefilter, &mode)
+                };
+                let tops: std::vec::Vec<f64> = (40_000..160_000)
+                    .filter(|&step| left(step) >= left(step - 1) && left(step) > left(step + 1))
+                    .map(left)
+                    .collect();
+                assert_eq!(tops.len(), humps, "{kind:?} {v_tol} {damping}");
+                let highest = tops.iter().copied().fold(0.0, f64::max);
+                let off = highest - f64::from(v_tol);
+                assert!(off.abs() < 2e-8, "{kind:?} {v_tol} {damping}: {highest}");
+            }
+        }
+    }
+
+    /// The half width of the band in % of the nominal frequency, without damping.
+    fn half_width(kind: Kind) -> f64 {
+        let mode = Mode {
+            damping: 0.0,
+            ..MODE
+        };
+        let band = insensitivity(&prefilter(kind, 0.0), &mode, 0.05 + 1e-7).unwrap();
+        50.0 * (band.high_hz - band.low_hz)
+    }
+
+    #[test]
+    fn published_comparison_of_shapers() {
+        // [vNoorden21]: residual at ±15 % frequency error, %; the jerk-limited profile is a
+        // box over the period
+        let undamped = |kind, ratio| {
             let mode = Mode {
-                damping: damping.into(),
-                ..MODE
+                frequency_hz: ratio,
+                damping: 0.0,
             };
-            let left = residual(&prefilter(Kind::Ei, damping), &mode);
-            assert!((left - super::super::EI_RESIDUAL).abs() < 1e-9);
+            100.0 * residual(&prefilter(kind, 0.0), &mode)
+        };
+        for (kind, published) in [(Kind::Zv, 23.3), (Kind::Zvd, 5.45), (Kind::Fir, 17.0)] {
+            let worst = undamped(kind, 0.85).max(undamped(kind, 1.15));
+            assert!((worst - published).abs() < 0.05, "{kind:?}: {worst}");
+        }
+        // insensitivity at 5 %: ±%; the last two are 72.6 and 95 % wide in the literature
+        for (kind, published, within) in [
+            (Kind::Zv, 3.18, 0.01),
+            (Kind::Zvd, 14.36, 0.01),
+            (Kind::Ei, 19.97, 0.01),
+            (Kind::TwoHumpEi, 36.3, 0.1),
+            (Kind::ThreeHumpEi, 47.5, 0.75),
+        ] {
+            let width = half_width(kind);
+            assert!((width - published).abs() < within, "{kind:?}: ±{width} %");
+        }
+        // from the closed forms |cos(πr/2)|³ and |(2 − √2) cos(3πr/4) + √2 − 1|
+        for (kind, exact) in [(Kind::Zvdd, 24.0191), (Kind::Mzv, 5.1748)] {
+            let width = half_width(kind);
+            assert!((width - exact).abs() < 1e-3, "{kind:?}: ±{width} %");
         }
     }
 }

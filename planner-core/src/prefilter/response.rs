@@ -2,13 +2,16 @@
 
 use heapless::Vec;
 
-use super::Stage;
+use super::{Impulses, Stage};
 
-/// Breakpoints of a response: ZVD for two modes and a box have 18.
-const MAX_BREAKS: usize = 24;
+/// Breakpoints of a response: 3-hump EI for two modes and two boxes have 100.
+const MAX_BREAKS: usize = 100;
 
-/// Coefficients of a ramp response: degree 1 and one more for each box, up to two boxes.
-const COEFFICIENTS: usize = 4;
+/// Boxes of a cascade: S-curves for two modes have four.
+const MAX_BOXES: usize = 4;
+
+/// Coefficients of a ramp response: degree 1 and one more for each box.
+const COEFFICIENTS: usize = MAX_BOXES + 2;
 
 /// Times closer than this are one breakpoint (in seconds).
 const SAME_TIME_S: f64 = 1e-12;
@@ -30,6 +33,9 @@ pub struct Response {
     pieces: Vec<Piece, MAX_BREAKS>,
     length_s: f32,
     delay_s: f32,
+    spread_s: f32,
+    /// More than two boxes: the coefficients of the highest orders count.
+    is_of_high_degree: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -48,62 +54,30 @@ struct Term {
 
 impl Response {
     /// The response of a cascade, or of the same cascade run backwards in time.
+    ///
+    /// The cascade [has room](Self::has_room_for).
     pub(super) fn new(stages: &[Stage], reversed: bool) -> Self {
-        let mut terms: Vec<Term, MAX_BREAKS> = Vec::new();
-        add(&mut terms, Term { b: 0.0, c: 1.0 });
-        let mut degree = 1;
-        for stage in stages {
-            let before = core::mem::take(&mut terms);
-            match stage {
-                Stage::Box(length_s) => {
-                    degree += 1;
-                    for Term { b, c } in before {
-                        let c = c / length_s;
-                        add(&mut terms, Term { b, c });
-                        add(
-                            &mut terms,
-                            Term {
-                                b: b + length_s,
-                                c: -c,
-                            },
-                        );
-                    }
-                }
-                shaper => {
-                    let end = shaper.length_s();
-                    for Term { b, c } in before {
-                        for impulse in &shaper.impulses() {
-                            let time = if reversed {
-                                end - impulse.time_s
-                            } else {
-                                impulse.time_s
-                            };
-                            add(
-                                &mut terms,
-                                Term {
-                                    b: b + time,
-                                    c: c * impulse.amplitude,
-                                },
-                            );
-                        }
-                    }
-                }
-            }
-        }
+        let mut terms = terms(stages, reversed).unwrap_or_default();
+        let variance_s2: f64 = stages.iter().map(Stage::variance_s2).sum();
         terms.sort_unstable_by(|x, y| x.b.total_cmp(&y.b));
-        Self::from_terms(&terms, degree)
+        Self::from_terms(&terms, 1 + boxes(stages), libm::sqrt(variance_s2))
+    }
+
+    /// Whether a cascade has no more boxes and breakpoints than a response can have.
+    pub(super) fn has_room_for(stages: &[Stage]) -> bool {
+        boxes(stages) <= MAX_BOXES && terms(stages, false).is_some()
     }
 
     /// One polynomial a piece: shift the last one to the next breakpoint, add its term.
-    fn from_terms(terms: &[Term], degree: i32) -> Self {
+    fn from_terms(terms: &[Term], degree: usize, spread_s: f64) -> Self {
         let mut pieces = Vec::new();
         let mut now = [0.0_f64; COEFFICIENTS];
         let mut at = 0.0;
-        let factorial: f64 = (1..=degree).map(f64::from).product();
+        let factorial: f64 = (1..=degree).map(|order| order as f64).product();
         for term in terms {
             shift(&mut now, term.b - at);
             at = term.b;
-            if let Some(highest) = now.get_mut(degree as usize) {
+            if let Some(highest) = now.get_mut(degree) {
                 *highest += term.c / factorial;
             }
             // capacity equals that of the terms, so the push cannot fail
@@ -116,12 +90,14 @@ impl Response {
         let delay_s = length_s - now[0];
         // Behind the last breakpoint the response is the raw ramp, late by the centroid.
         if let Some(last) = pieces.last_mut() {
-            last.ramp = [now[0] as f32, 1.0, 0.0, 0.0];
+            last.ramp = [now[0] as f32, 1.0, 0.0, 0.0, 0.0, 0.0];
         }
         Self {
             pieces,
             length_s: length_s as f32,
             delay_s: delay_s as f32,
+            spread_s: spread_s as f32,
+            is_of_high_degree: degree > 3,
         }
     }
 
@@ -137,37 +113,83 @@ impl Response {
         self.delay_s
     }
 
+    /// `σ`, the standard deviation of the prefilter's weight in seconds.
+    #[must_use]
+    pub fn spread_s(&self) -> f32 {
+        self.spread_s
+    }
+
     /// `(S(t), I(t))`: the step response (0 to 1) and the ramp response (in seconds) at `t`.
     ///
     /// Where `S` jumps it is the limit from the right; before zero both are zero.
     #[must_use]
     pub fn at(&self, t_s: f32) -> (f32, f32) {
-        let Some(piece) = self
-            .pieces
-            .iter()
-            .take_while(|piece| piece.start_s <= t_s)
-            .last()
-        else {
+        let begun = self.pieces.partition_point(|piece| piece.start_s <= t_s);
+        let Some(piece) = begun.checked_sub(1).and_then(|last| self.pieces.get(last)) else {
             return (0.0, 0.0);
         };
         let t = t_s - piece.start_s;
-        let [c0, c1, c2, c3] = piece.ramp;
+        let [c0, c1, c2, mut c3, c4, c5] = piece.ramp;
+        let mut bend = 3.0 * c3;
+        if self.is_of_high_degree {
+            bend += t * (4.0 * c4 + t * (5.0 * c5));
+            c3 += t * (c4 + t * c5);
+        }
         let ramp = c0 + t * (c1 + t * (c2 + t * c3));
-        let step = c1 + t * (2.0 * c2 + t * (3.0 * c3));
+        let step = c1 + t * (2.0 * c2 + t * bend);
         (step, ramp)
     }
 }
 
-/// Adds a term, joined with one at the same time if there is one.
-fn add(terms: &mut Vec<Term, MAX_BREAKS>, term: Term) {
+fn boxes(stages: &[Stage]) -> usize {
+    let is_box = |stage: &&Stage| matches!(stage, Stage::Box(_));
+    stages.iter().filter(is_box).count()
+}
+
+/// The terms of a cascade's ramp response, or of that run backwards; none if they are too many.
+fn terms(stages: &[Stage], reversed: bool) -> Option<Vec<Term, MAX_BREAKS>> {
+    let mut terms: Vec<Term, MAX_BREAKS> = Vec::new();
+    add(&mut terms, Term { b: 0.0, c: 1.0 })?;
+    for stage in stages {
+        let impulses = match stage {
+            Stage::Box(length_s) => {
+                for Term { b, c } in core::mem::take(&mut terms) {
+                    let c = c / length_s;
+                    add(&mut terms, Term { b, c })?;
+                    let b = b + length_s;
+                    add(&mut terms, Term { b, c: -c })?;
+                }
+                continue;
+            }
+            Stage::Zv(mode) => Impulses::zv(mode),
+            Stage::Impulses(list) => *list,
+        };
+        let end = stage.length_s();
+        for Term { b, c } in core::mem::take(&mut terms) {
+            for impulse in impulses.iter() {
+                let time = if reversed {
+                    end - impulse.time_s
+                } else {
+                    impulse.time_s
+                };
+                let (b, c) = (b + time, c * impulse.amplitude);
+                add(&mut terms, Term { b, c })?;
+            }
+        }
+    }
+    Some(terms)
+}
+
+/// Adds a term, joined with one at the same time if there is one; none if there is no room.
+fn add(terms: &mut Vec<Term, MAX_BREAKS>, term: Term) -> Option<()> {
     match terms
         .iter_mut()
         .find(|other| libm::fabs(other.b - term.b) < SAME_TIME_S)
     {
         Some(same) => same.c += term.c,
-        // the named prefilters have six at the most
-        None => drop(terms.push(term)),
+        None => terms.push(term).ok()?,
     }
+    Some(())
 }
 
 /// Rewrites a polynomial in `t` as one in `t − by` (Horner's scheme, repeated).

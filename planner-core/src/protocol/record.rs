@@ -24,7 +24,7 @@ pub const TEXT_BYTES: usize = 80;
 pub type KeptText = heapless::String<TEXT_BYTES>;
 
 /// The longest record in bytes.
-pub const RECORD_BYTES: usize = 320;
+pub const RECORD_BYTES: usize = 640;
 
 const _: () = assert!(SETTINGS_BYTES <= RECORD_BYTES && Offsets::BYTES <= RECORD_BYTES);
 

@@ -16,6 +16,7 @@ pub const DEFAULTS: Defaults = Defaults {
         kind: Kind::FirZvd,
         frequency_hz: 6.34,
         damping: 0.022,
+        ..PrefilterConfig::DEFAULT
     },
     elbow: Elbow::Right,
     first_point_declares: true,
