@@ -10,6 +10,9 @@ use crate::units::{TICK_HZ, TICK_S};
 /// fractional delays. A power of two, so that an index is masked and never out of bounds.
 pub const SLOTS: usize = 1024;
 
+/// Slots of half a delay line, for each of two filters that share it: prefilters of up to 0.5 s.
+pub const HALF_SLOTS: usize = SLOTS / 2;
+
 /// Weights count in 2^-30; those of a stage sum to exactly 2^30.
 pub(super) const WEIGHT_BITS: u32 = 30;
 
@@ -54,6 +57,24 @@ impl StageTaps {
             Taps::Impulses(taps) | Taps::Box(taps) => taps,
         }
     }
+
+    /// The mean delay, exactly that of the rounded weights.
+    ///
+    /// ```text
+    /// shaper: Σ w_i d_i        box: Σ n Σ_{d_j ≤ n} c_j = −Σ c_j d_j (d_j − 1) / 2,   as Σ c_j = 0
+    /// ```
+    fn centroid(&self) -> TickTime {
+        let is_box = matches!(self.taps, Taps::Box(_));
+        let moments = self.list().iter().map(|tap| {
+            let (delay, weight) = (i64::from(tap.delay), i64::from(tap.weight));
+            if is_box {
+                -weight * (delay * (delay - 1) / 2)
+            } else {
+                weight * delay
+            }
+        });
+        moments.sum::<i64>() << (32 - WEIGHT_BITS)
+    }
 }
 
 /// A prefilter's taps for the tick.
@@ -80,6 +101,7 @@ pub struct Kernel {
     length_ticks: u16,
     delay_ticks: u16,
     length: TickTime,
+    centroid: TickTime,
     is_pure_shaper: bool,
 }
 
@@ -119,6 +141,7 @@ impl Kernel {
             }
         }
         Ok(Self {
+            centroid: stages.iter().map(StageTaps::centroid).sum(),
             stages,
             length_ticks: first_slot,
             delay_ticks: delays,
@@ -131,6 +154,13 @@ impl Kernel {
     #[must_use]
     pub fn length(&self) -> TickTime {
         self.length
+    }
+
+    /// `m`, the mean delay: how far the output of a steady motion is behind. It is exactly that
+    /// of the integer taps.
+    #[must_use]
+    pub fn centroid(&self) -> TickTime {
+        self.centroid
     }
 
     /// How long the raw path stands at an exact stop, when it arrives `until_tick` before a tick.

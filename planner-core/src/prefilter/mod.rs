@@ -13,8 +13,8 @@ mod residual;
 mod response;
 
 pub use cascade::{Impulse, MAX_STAGES, Prefilter, Stage};
-pub use convolver::{Convolver, FINE_BITS};
-pub use kernel::{Kernel, SLOTS};
+pub use convolver::{Convolver, ConvolverPair, FINE_BITS};
+pub use kernel::{HALF_SLOTS, Kernel, SLOTS};
 pub use mode::Mode;
 pub use residual::{Band, insensitivity, residual};
 pub use response::Response;
