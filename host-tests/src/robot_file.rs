@@ -8,6 +8,7 @@ use std::path::Path;
 
 use planner_core::config::{ConfigError, Robot, RobotConfig};
 use planner_core::kinematics::{Elbow, JointRange, ScaraError};
+use planner_core::posture::{FollowError, MapError};
 use planner_core::prefilter::{CustomImpulse, Kind, MAX_IMPULSES, PrefilterConfig, PrefilterError};
 use serde::{Deserialize, Deserializer};
 
@@ -146,6 +147,17 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
             }
             PrefilterError::TooLong { .. } => vec!["prefilter.frequency_hz", "prefilter.name"],
             PrefilterError::TooManyKinks => vec!["prefilter.impulses", "prefilter.name"],
+        },
+        ConfigError::Follow(error) => match error {
+            FollowError::Map(MapError::Size { .. }) => vec!["map.columns", "map.rows"],
+            FollowError::Map(MapError::Place { axis: 'X' }) => vec!["map.x_mm"],
+            FollowError::Map(MapError::Place { .. }) => vec!["map.y_mm"],
+            FollowError::Map(MapError::Frequency { .. }) => vec!["map.frequencies_hz"],
+            FollowError::Map(MapError::Damping { .. }) => vec!["map.dampings"],
+            FollowError::Prefilter(_) | FollowError::TooLong { .. } => {
+                vec!["map.frequencies_hz", "prefilter.name"]
+            }
+            FollowError::Shortest(_) => vec!["prefilter.residual_limit", "prefilter.uncertainty"],
         },
         ConfigError::Range { name, .. } => match *name {
             "tolerance" => vec!["motion.corner_tolerance_mm"],

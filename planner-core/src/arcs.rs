@@ -47,6 +47,13 @@ impl Arcs {
         *self = Self::default();
     }
 
+    /// Whether none is in flight.
+    pub fn are_clear(&self) -> bool {
+        self.channels
+            .iter()
+            .all(|channel| matches!(channel.phase, Phase::Free))
+    }
+
     /// Whether another arc may begin.
     pub fn has_room(&self) -> bool {
         self.channels

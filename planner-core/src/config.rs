@@ -4,6 +4,7 @@ use core::fmt;
 
 use crate::kinematics::{Arm, ArmKind, Elbow, JointRange, Scara, ScaraConfig, ScaraError};
 use crate::pose::AXES;
+use crate::posture::{FollowConfig, FollowError, Follower, ModeMapConfig, PostureMethod, Tuning};
 use crate::prefilter::{Kernel, Kind, Prefilter, PrefilterConfig, PrefilterError, Response};
 
 /// Everything that a builder sets.
@@ -15,6 +16,10 @@ pub struct RobotConfig {
     pub scara: ScaraConfig,
     /// Which vibration to suppress, and how.
     pub prefilter: PrefilterConfig,
+    /// The mode over the workspace; without it the prefilter's is the mode everywhere.
+    pub map: ModeMapConfig,
+    /// What the prefilters that follow the map are made from.
+    pub posture_method: PostureMethod,
     /// Corner tolerance in mm where the program gives none, 0 to 100; 0 stops at corners.
     pub corner_tolerance_mm: f32,
     /// Feedrate of `G0` in mm/s, above 0 to 10 000.
@@ -33,6 +38,8 @@ impl Default for RobotConfig {
             arm: ArmKind::default(),
             scara: ScaraConfig::default(),
             prefilter: PrefilterConfig::default(),
+            map: ModeMapConfig::NONE,
+            posture_method: PostureMethod::Local,
             corner_tolerance_mm: 0.5,
             rapid_mm_s: 160.0,
             feed_limit_mm_s: 1000.0,
@@ -49,6 +56,8 @@ pub enum ConfigError {
     Scara(ScaraError),
     /// The prefilter.
     Prefilter(PrefilterError),
+    /// The map of the mode, or the prefilters that follow it.
+    Follow(FollowError),
     /// A plain number is out of its range.
     Range {
         /// Name of the setting.
@@ -79,6 +88,7 @@ impl fmt::Display for ConfigError {
         match self {
             Self::Scara(error) => error.fmt(f),
             Self::Prefilter(error) => error.fmt(f),
+            Self::Follow(error) => error.fmt(f),
             Self::Range {
                 name,
                 value,
@@ -101,6 +111,10 @@ pub struct Robot {
     pub config: RobotConfig,
     /// Kinematics of the arm.
     pub arm: Arm,
+    /// Chooses the prefilters of each move, if there is a map of the mode.
+    pub follower: Option<Follower>,
+    /// What the prefilter in force at the end of the path planned so far is made of.
+    pub tuning: Tuning,
     /// The prefilter in seconds.
     pub prefilter: Prefilter,
     /// The prefilter in integer taps.
@@ -134,12 +148,16 @@ impl Robot {
                 });
             }
         }
-        let prefilter = Prefilter::new(&config.prefilter)?;
+        let follower = follower(config)?;
+        let tuning = first_tuning(config, follower.as_ref());
+        let prefilter = tuning.prefilter()?;
         Ok(Self {
             config: *config,
             arm: match config.arm {
                 ArmKind::Scara => Arm::Scara(Scara::new(&config.scara)?),
             },
+            follower,
+            tuning,
             kernel: Kernel::new(&prefilter)?,
             accelerating: prefilter.response(),
             decelerating: prefilter.reversed_response(),
@@ -153,19 +171,55 @@ impl Robot {
         self.arm.set_elbow(elbow);
     }
 
-    /// Changes the prefilter.
+    /// Changes the prefilter; with a map, the kind that follows it.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the value that is out of range; nothing is changed then.
+    pub fn set_prefilter(&mut self, config: &PrefilterConfig) -> Result<(), ConfigError> {
+        let changed = RobotConfig {
+            prefilter: *config,
+            ..self.config
+        };
+        let follower = follower(&changed)?;
+        self.tune(&first_tuning(&changed, follower.as_ref()))?;
+        self.follower = follower;
+        self.config = changed;
+        Ok(())
+    }
+
+    /// Goes on with a prefilter of this tuning.
     ///
     /// # Errors
     /// [`PrefilterError`] names the value that is out of range; nothing is changed then.
-    pub fn set_prefilter(&mut self, config: &PrefilterConfig) -> Result<(), PrefilterError> {
-        let prefilter = Prefilter::new(config)?;
+    pub fn tune(&mut self, tuning: &Tuning) -> Result<(), PrefilterError> {
+        let prefilter = tuning.prefilter()?;
         self.kernel = Kernel::new(&prefilter)?;
         self.accelerating = prefilter.response();
         self.decelerating = prefilter.reversed_response();
         self.prefilter = prefilter;
-        self.config.prefilter = *config;
+        self.tuning = *tuning;
         Ok(())
     }
+}
+
+/// What chooses the prefilters of each move, if there is a map.
+fn follower(config: &RobotConfig) -> Result<Option<Follower>, ConfigError> {
+    if !config.map.is_some() {
+        return Ok(None);
+    }
+    let follow = FollowConfig {
+        map: &config.map,
+        kind: config.prefilter.kind,
+        shortest: None,
+        method: config.posture_method,
+    };
+    let follower = Follower::new(&follow).map_err(ConfigError::Follow)?;
+    Ok(Some(follower))
+}
+
+/// What the prefilter is made of before the first move.
+fn first_tuning(config: &RobotConfig, follower: Option<&Follower>) -> Tuning {
+    follower.map_or(Tuning::Named(config.prefilter), Follower::slowest)
 }
 
 /// Why a `name=value` setting is refused.

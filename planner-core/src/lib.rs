@@ -5,6 +5,7 @@
 extern crate std;
 
 mod arcs;
+mod changeover;
 pub mod config;
 pub mod corner;
 pub mod gcode;

@@ -1,15 +1,17 @@
 //! The tick: from the raw path to joint setpoints, once a millisecond.
 
 use crate::arcs::{ARC_CHANNELS, ArcFilters, Arcs};
+use crate::changeover::Changeover;
 use crate::config::Robot;
 use crate::joint_space::{self, Space};
 use crate::kinematics::{Arm, ArmKind, Elbow};
 use crate::pose::{AXES, JointPosition, JointState, Pose};
-use crate::prefilter::{Convolver, FINE_BITS, Kernel};
+use crate::prefilter::{Convolver, ConvolverPair, FINE_BITS};
 use crate::queue::{Action, RawItem, SegmentConsumer};
 use crate::rate::Rate;
+use crate::raw::TickTime;
 use crate::units::TICK_HZ;
-use crate::walker::{Rates, Walker};
+use crate::walker::{MayBegin, Rates, Walker};
 
 /// Whether the robot moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -100,7 +102,7 @@ struct Seek {
 /// that it can be placed where large zeroed memory belongs.
 #[derive(Debug, Default)]
 pub struct DelayLines {
-    lines: Convolver<AXES>,
+    lines: ConvolverPair<AXES>,
     arcs: ArcFilters,
 }
 
@@ -109,7 +111,7 @@ impl DelayLines {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            lines: Convolver::new(),
+            lines: ConvolverPair::new(),
             arcs: [const { Convolver::new() }; ARC_CHANNELS],
         }
     }
@@ -119,14 +121,15 @@ impl DelayLines {
 ///
 /// The raw point's lines and chords go through one filter, the progress of each arc through
 /// one of its own, from which follows the arc's bow. Their sum is the command; velocity and
-/// acceleration are its central differences, one tick behind the newest point.
+/// acceleration are its central differences, one tick behind the newest point. While the
+/// prefilter changes on the way, the raw point goes through the next one's filter besides.
 ///
 /// [`Motion::tick`] cannot fail, does not allocate, and costs the same whatever the filter's
 /// length and the number of segments in flight: below 2 000 instructions on a
-/// Cortex-M4F, and below 2 500 while two arcs overlap.
+/// Cortex-M4F, and below 2 500 while two arcs overlap or the prefilter changes.
 pub struct Motion<'q> {
     walker: Walker<'q>,
-    kernel: Kernel,
+    changeover: Changeover,
     kinematics: Arm,
     filters: &'q mut DelayLines,
     arcs: Arcs,
@@ -173,10 +176,12 @@ impl<'q> Motion<'q> {
     #[must_use]
     pub fn new(robot: &Robot, segments: SegmentConsumer<'q>, filters: &'q mut DelayLines) -> Self {
         let start = Pose::default().to_bits();
-        filters.lines.reset(start);
+        let mut changeover = Changeover::new(&robot.kernel);
+        filters.lines.share(robot.follower.is_some());
+        changeover.rest_at(&mut filters.lines, start);
         Self {
             walker: Walker::new(segments, start),
-            kernel: robot.kernel.clone(),
+            changeover,
             kinematics: robot.arm.clone(),
             filters,
             arcs: Arcs::default(),
@@ -225,7 +230,8 @@ impl<'q> Motion<'q> {
         if self.mode == Mode::Idle {
             let pose = self.pose();
             let joints = self.kinematics.inverse(&pose);
-            self.kernel = robot.kernel.clone();
+            self.changeover.set_kernel(robot.kernel.clone());
+            self.filters.lines.share(robot.follower.is_some());
             self.kinematics = robot.arm.clone();
             self.rest_at(self.nearest_point());
             // Another arm at the same pose.
@@ -369,21 +375,60 @@ impl<'q> Motion<'q> {
     /// The newest command in 2^-32 mm: one tick of the raw path, filtered.
     fn command(&mut self) -> [i64; AXES] {
         self.walker.hold(self.mode != Mode::Running);
-        let raw = self.walker.step(&self.kernel, self.arcs.has_room());
-        let [x, y, z, c] = self.filters.lines.process(&self.kernel, raw.chord);
-        let [bow_x, bow_y] = self.arcs.step(&mut self.filters.arcs, &self.kernel, &raw);
-        let newest = [x.wrapping_add(bow_x), y.wrapping_add(bow_y), z, c];
-        self.stood_for = if raw.moved {
+        let may_begin = if self.changeover.is_due() {
+            MayBegin::None
+        } else if self.arcs.has_room() {
+            MayBegin::Any
+        } else {
+            MayBegin::Lines
+        };
+        let kernel = self.changeover.kernel();
+        let raw = self.walker.step(kernel, may_begin);
+        let (chord, moved, changes_over) = (raw.chord, raw.moved, raw.changes_over);
+        let [bow_x, bow_y] = self.arcs.step(&mut self.filters.arcs, kernel, &raw);
+        let line = self.changeover.step(&mut self.filters.lines, chord);
+        if changes_over {
+            self.prepare_changeover();
+        }
+        if let Some(ahead) = self.changeover.ahead() {
+            self.approach_changeover(ahead, line);
+        }
+        self.stood_for = if moved {
             0
         } else {
             self.stood_for.saturating_add(1)
         };
         // the filters and then the two ticks of history have settled
-        if self.stood_for > self.kernel.delay_ticks() + 1 {
+        let settled = self.stood_for > self.changeover.kernel().delay_ticks() + 1;
+        if settled && self.changeover.has_faded() {
+            self.changeover.come_to_rest(&mut self.filters.lines, chord);
             self.come_to_rest();
             return self.history[1];
         }
-        newest
+        let [x, y, z, c] = line;
+        [x.wrapping_add(bow_x), y.wrapping_add(bow_y), z, c]
+    }
+
+    /// The segment that has begun brings a kernel that is to come into force on its way.
+    #[inline(never)]
+    fn prepare_changeover(&mut self) {
+        if let Some(kernel) = self.walker.take_kernel() {
+            self.changeover.prepare(kernel);
+        }
+    }
+
+    /// Feeds the filter to come, and changes over to it where that does not show.
+    #[inline(never)]
+    fn approach_changeover(&mut self, ahead: TickTime, line: [i64; AXES]) {
+        let seen = if self.arcs.are_clear() {
+            self.walker.look_ahead(ahead)
+        } else {
+            None
+        };
+        let lines = &mut self.filters.lines;
+        if let Some(jump) = self.changeover.approach(lines, seen, line) {
+            self.walker.jump(jump);
+        }
     }
 
     /// What happens when everything stands.
@@ -444,6 +489,7 @@ impl<'q> Motion<'q> {
 
     /// Stays where everything stands, and begins to empty the queue.
     fn forget(&mut self) {
+        self.walker.leave();
         self.rest_at(self.nearest_point());
         self.seek = None;
         self.mode = Mode::Forgetting;
@@ -455,6 +501,7 @@ impl<'q> Motion<'q> {
         for _ in 0..FORGOTTEN_A_TICK {
             match self.walker.forget() {
                 Some(RawItem::Action(Action::Prefilter)) => self.change_prefilter(),
+                Some(RawItem::Segment(segment)) if segment.changes_over => self.change_prefilter(),
                 Some(RawItem::Action(_) | RawItem::Segment(_)) => {}
                 None => {
                     self.mode = Mode::Idle;
@@ -467,7 +514,7 @@ impl<'q> Motion<'q> {
     /// Goes on with the next kernel, at rest.
     fn change_prefilter(&mut self) {
         if let Some(kernel) = self.walker.take_kernel() {
-            self.kernel = kernel;
+            self.changeover.set_kernel(kernel);
             self.rest_at(self.nearest_point());
         }
     }
@@ -481,7 +528,7 @@ impl<'q> Motion<'q> {
     /// Puts everything to rest at a point.
     fn rest_at(&mut self, point: [i32; AXES]) {
         self.walker.place(point);
-        self.filters.lines.reset(point);
+        self.changeover.rest_at(&mut self.filters.lines, point);
         self.arcs.clear();
         self.history = [point.map(|value| i64::from(value) << FINE_BITS); 2];
         self.stood_for = u16::MAX;

@@ -2,16 +2,17 @@
 
 use core::fmt;
 
-use crate::config::Robot;
+use crate::config::{ConfigError, Robot};
 use crate::gcode::{
     self, Command, Defaults, Feed, Interpreted, Interpreter, Line, MAX_ACTIONS_A_LINE, Move,
     Offsets, ProgramFlow, RobotChange,
 };
 use crate::kinematics::{Arm, Elbow, PoseError, SegmentError};
-use crate::path::PathSegment;
+use crate::path::{PathSegment, Shape};
 use crate::pose::{JointPosition, Pose};
-use crate::prefilter::{Kernel, Prefilter, PrefilterConfig, PrefilterError};
-use crate::queue::SegmentProducer;
+use crate::posture::{MoveToFollow, MoveTunings, Tuning};
+use crate::prefilter::{Kernel, PrefilterConfig};
+use crate::queue::{KERNELS_A_LINE, SegmentProducer};
 use crate::raw::{LONGEST_S, Pace};
 use crate::schedule::{Schedule, Timing};
 use crate::units::AngleRad;
@@ -52,7 +53,9 @@ pub enum Cause {
     /// Part of the jog cannot be reached.
     Jog(SegmentError),
     /// The prefilter of M100.
-    Prefilter(PrefilterError),
+    Prefilter(ConfigError),
+    /// M100 gives a mode of its own although there is a map.
+    MapSaysMode,
     /// The segment would take more than a day.
     TooSlow {
         /// How long it would take.
@@ -76,7 +79,7 @@ impl LineError {
             Cause::Jog(_) => 15,
             Cause::TooSlow { .. } => 73,
             Cause::Full => 74,
-            Cause::Prefilter(_) => 76,
+            Cause::Prefilter(_) | Cause::MapSaysMode => 76,
         }
     }
 }
@@ -100,6 +103,9 @@ impl fmt::Display for LineError {
             Cause::TooSlow { duration_s } => write!(
                 f,
                 "the segment would take {duration_s:.0} s, more than a day: give a higher feedrate"
+            ),
+            Cause::MapSaysMode => f.write_str(
+                "the map says frequency and damping: give M100 without Q and R, or remove the map with $map=0",
             ),
             Cause::Full => f.write_str("the look-ahead is full: wait for ok before the next line"),
         }
@@ -148,7 +154,12 @@ impl<'q> Planner<'q> {
     /// Whether the look-ahead has room for all that a line can ask for. Give one only then.
     #[must_use]
     pub fn has_room(&self) -> bool {
-        self.schedule.free_places() >= MAX_ACTIONS_A_LINE
+        let places = self.schedule.free_places();
+        if self.robot.follower.is_none() {
+            return places >= MAX_ACTIONS_A_LINE;
+        }
+        // a change of the prefilter before each move
+        places >= MAX_ACTIONS_A_LINE + 2 && self.schedule.free_kernels() >= KERNELS_A_LINE
     }
 
     /// Segments that the look-ahead has room for.
@@ -369,14 +380,7 @@ impl<'q> Planner<'q> {
             queued |= self.stand_still(f64::from(duration_s));
         }
         for (order, timing) in command.moves().zip(&timings) {
-            queued |= timing.duration_s > 0.0
-                && self.schedule.plan(
-                    &self.robot,
-                    &order.path,
-                    timing,
-                    order.corner_tolerance_mm,
-                    order.line,
-                );
+            queued |= timing.duration_s > 0.0 && self.plan_move(order, timing);
         }
         if let Some(outputs) = command.outputs_after {
             queued |= self.schedule.switch(outputs);
@@ -395,6 +399,45 @@ impl<'q> Planner<'q> {
             offsets_stored: interpreted.stores_offsets(),
             ended: command.flow == Some(ProgramFlow::End),
         })
+    }
+
+    /// Queues a move, with the prefilters that the map asks for.
+    fn plan_move(&mut self, order: &Move, timing: &Timing) -> bool {
+        let next = self.follow(order, timing);
+        // a map whose slowest mode has a prefilter has one for every mode
+        let next = next.and_then(|tuning| Some((tuning, tuning.prefilter().ok()?)));
+        let next = next.and_then(|(tuning, it)| Some((tuning, Kernel::new(&it).ok()?)));
+        let queued = self.schedule.plan(
+            &self.robot,
+            &order.path,
+            timing,
+            order.corner_tolerance_mm,
+            order.line,
+            next.as_ref().map(|(_, kernel)| kernel),
+        );
+        if let Some((tuning, _)) = next {
+            let _ = self.robot.tune(&tuning);
+        }
+        queued
+    }
+
+    /// Changes the prefilter before a move from rest as the map asks for, and yields the one
+    /// to which it is to change on the move's way.
+    fn follow(&mut self, order: &Move, timing: &Timing) -> Option<Tuning> {
+        let follower = self.robot.follower.as_ref()?;
+        let from_rest = self.schedule.begins_from_rest(order.corner_tolerance_mm);
+        let step = MoveToFollow {
+            course: follower.course(&order.path),
+            duration_s: timing.duration_s,
+            from_rest,
+            is_line: matches!(order.path.shape, Shape::Line),
+            after_arc: !from_rest && self.schedule.follows_arc(),
+        };
+        let MoveTunings { start, end } = follower.tunings(&step, &self.robot.tuning);
+        if !start.is_near(&self.robot.tuning) && self.robot.tune(&start).is_ok() {
+            self.schedule.change_prefilter(&self.robot.kernel);
+        }
+        Some(end).filter(|end| !end.is_near(&self.robot.tuning))
     }
 
     /// Changes the elbow's side, by a move of the joints where the position is known.
@@ -455,7 +498,7 @@ impl<'q> Planner<'q> {
     fn timings(&self, arm: &Arm, command: &Command) -> Result<[Timing; 2], Cause> {
         match &command.robot {
             Some(RobotChange::Prefilter(config)) => {
-                Self::check_prefilter(config).map_err(Cause::Prefilter)?;
+                self.check_prefilter(config)?;
             }
             Some(RobotChange::Elbow(elbow)) => {
                 self.elbow_move(arm, *elbow)?;
@@ -480,9 +523,17 @@ impl<'q> Planner<'q> {
         Ok(timings)
     }
 
-    /// Whether a prefilter can be made of these settings.
-    fn check_prefilter(config: &PrefilterConfig) -> Result<(), PrefilterError> {
-        Kernel::new(&Prefilter::new(config)?).map(drop)
+    /// Whether the prefilter can be changed to these settings. Not inlined, so that the other
+    /// robot is on the stack for a moment only.
+    #[inline(never)]
+    fn check_prefilter(&self, config: &PrefilterConfig) -> Result<(), Cause> {
+        let own = &self.robot.config.prefilter;
+        let says_mode = (config.frequency_hz, config.damping) != (own.frequency_hz, own.damping);
+        if self.robot.follower.is_some() && says_mode {
+            return Err(Cause::MapSaysMode);
+        }
+        let changed = self.robot.clone().set_prefilter(config);
+        changed.map_err(Cause::Prefilter)
     }
 
     /// How long a motion takes; zero if it is shorter than anything.

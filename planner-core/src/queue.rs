@@ -12,9 +12,13 @@ use crate::raw::RawSegment;
 /// 64 segments of 0.5 mm at 160 mm/s last 0.2 s, longer than a serial line hesitates.
 pub const LOOKAHEAD: usize = 64;
 
-/// Changes of the prefilter that can wait: one that is about to happen and one more, because
-/// everything stands before each of them.
-pub const KERNELS: usize = 2;
+/// Kernels that can wait: with a map of the mode a move may need two, one at its start and one
+/// on its way. Seven such moves fill the time that the look-ahead lasts; with no room left the
+/// next segment waits.
+pub const KERNELS: usize = 8;
+
+/// Kernels that a line may need: two moves with two each.
+pub const KERNELS_A_LINE: usize = 4;
 
 /// What the tick carries out, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,17 +102,36 @@ impl SegmentProducer<'_> {
         }
     }
 
+    /// Places for kernels that are free.
+    #[must_use]
+    pub fn free_kernels(&self) -> usize {
+        self.kernels.capacity() - self.kernels.len()
+    }
+
     /// Appends an item; `false` if there is no room.
     pub fn push(&mut self, item: RawItem) -> bool {
         self.items.enqueue(item).is_ok()
     }
 
-    /// Appends a change of the prefilter; `false` if there is no room.
+    /// Appends a change of the prefilter at rest; `false` if there is no room.
     pub fn push_kernel(&mut self, kernel: Kernel) -> bool {
-        // The kernel first: the tick looks for it when it comes to the item.
-        self.free_places() > 0
-            && self.kernels.enqueue(kernel).is_ok()
-            && self.push(RawItem::Action(Action::Prefilter))
+        self.push_with(kernel, RawItem::Action(Action::Prefilter))
+    }
+
+    /// Appends a segment on whose way the prefilter changes; `false` if there is no room.
+    pub fn push_changing(&mut self, segment: RawSegment, kernel: Kernel) -> bool {
+        self.push_with(
+            kernel,
+            RawItem::Segment(RawSegment {
+                changes_over: true,
+                ..segment
+            }),
+        )
+    }
+
+    /// The kernel first: the tick looks for it when it comes to the item.
+    fn push_with(&mut self, kernel: Kernel, item: RawItem) -> bool {
+        self.items.ready() && self.kernels.enqueue(kernel).is_ok() && self.push(item)
     }
 }
 

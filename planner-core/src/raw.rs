@@ -52,6 +52,8 @@ pub struct RawSegment {
     pub top_rate: Rate,
     /// What sets its rate.
     pub pace: Pace,
+    /// Whether the oldest kernel that waits becomes the prefilter on its way.
+    pub changes_over: bool,
     /// The number of the line that it comes from, for status reports.
     pub line: u32,
 }
@@ -87,6 +89,7 @@ impl RawSegment {
             },
             top_rate: Rate::ONE,
             pace: Pace::Feed,
+            changes_over: false,
             line: 0,
         }
     }

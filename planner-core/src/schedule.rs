@@ -102,6 +102,9 @@ impl<'q> Schedule<'q> {
     /// corner included, is within the smallest tolerance of the corners being rounded, or
     /// when they are done. Corners at arcs are always rounded alone.
     ///
+    /// On the way of the segment the prefilter may change to another one; what follows has to be
+    /// planned with a robot that has it.
+    ///
     /// `false` if the look-ahead is full.
     pub fn plan(
         &mut self,
@@ -110,6 +113,7 @@ impl<'q> Schedule<'q> {
         timing: &Timing,
         tolerance_mm: f32,
         line: u32,
+        on_the_way: Option<&Kernel>,
     ) -> bool {
         let length_mm = path.length_mm() as f32;
         let duration_s = timing.duration_s.clamp(TICK_S, LONGEST_S);
@@ -145,10 +149,31 @@ impl<'q> Schedule<'q> {
         } else {
             Rate::ONE
         };
-        self.queue.push(RawItem::Segment(RawSegment {
+        let segment = RawSegment {
             top_rate,
             ..segment
-        }))
+        };
+        match on_the_way {
+            None => self.queue.push(RawItem::Segment(segment)),
+            Some(kernel) => self.queue.push_changing(segment, kernel.clone()),
+        }
+    }
+
+    /// Whether the next segment begins from an exact stop, with that tolerance at its start.
+    pub fn begins_from_rest(&self, tolerance_mm: f32) -> bool {
+        let turned = self.previous.is_some_and(|side| side.feed_mm_s == 0.0);
+        self.previous.is_none() || tolerance_mm <= 0.0 || turned
+    }
+
+    /// Whether the last segment was an arc, which is still in flight when the next one begins.
+    pub fn follows_arc(&self) -> bool {
+        let is_arc = |side: Side| side.heading_rate_per_mm != 0.0;
+        self.previous.is_some_and(is_arc)
+    }
+
+    /// Places for kernels that are free.
+    pub fn free_kernels(&self) -> usize {
+        self.queue.free_kernels()
     }
 
     /// Plans a stand-still of `duration_s` after everything has stopped.

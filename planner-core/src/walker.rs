@@ -19,6 +19,17 @@ pub struct RawStep<'s> {
     pub progress: i32,
     /// Whether the raw point moved in this tick.
     pub moved: bool,
+    /// Whether a segment began on whose way the prefilter changes.
+    pub changes_over: bool,
+}
+
+/// The raw path as another filter has to see it while the raw point moves evenly.
+#[derive(Clone, Copy, Debug)]
+pub struct Ahead {
+    /// The point so much further along the segment.
+    pub chord: [i32; AXES],
+    /// Ticks for which the raw point has moved evenly.
+    pub even_for: u16,
 }
 
 /// The rates that the raw path is walked at.
@@ -86,6 +97,8 @@ impl Stand {
             remaining: next.duration,
             since_corner: self.time.wrapping_add(wait),
             licence,
+            pace: Rate::ZERO,
+            even_for: 0,
         };
         way.advance(next, wanted.min(licence).raw(left - wait), left - wait);
         Some(way)
@@ -119,9 +132,27 @@ struct Way {
     since_corner: TickTime,
     /// The highest rate that the corners on both sides allow for, at least 1.
     licence: Rate,
+    /// The rate of the last tick.
+    pace: Rate,
+    /// Whole ticks at that rate in a row.
+    even_for: u16,
 }
 
 impl Way {
+    /// The progress and the raw time to go `ahead` of real time further along, at the rate of
+    /// the last tick; nothing beyond the segment's ends.
+    fn ahead(&self, segment: &RawSegment, ahead: TickTime) -> Option<(u64, TickTime)> {
+        let share = self.pace.raw(ahead);
+        let way = part_of_tick(segment.rate, share.abs());
+        let progress = if share < 0 {
+            self.progress.checked_sub(way)?
+        } else {
+            self.progress.wrapping_add(way)
+        };
+        let remaining = self.remaining - share;
+        (remaining > 0).then_some((progress, remaining))
+    }
+
     /// The rate of the moment.
     fn rate(&mut self, kernel: &Kernel, segment: &RawSegment, wanted: Rate) -> Rate {
         if wanted > self.licence && self.since_corner >= kernel.settling_time() {
@@ -136,6 +167,27 @@ impl Way {
         self.progress = self.progress.wrapping_add(progress);
         self.remaining -= share;
         self.since_corner = self.since_corner.wrapping_add(time);
+    }
+}
+
+/// Which segments may begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MayBegin {
+    /// None: the prefilter has to change first.
+    None,
+    /// Lines only: there is no room for another arc.
+    Lines,
+    /// Any.
+    Any,
+}
+
+impl MayBegin {
+    fn allows(self, next: &RawSegment) -> bool {
+        match self {
+            Self::None => false,
+            Self::Lines => next.bow.is_none(),
+            Self::Any => true,
+        }
     }
 }
 
@@ -257,8 +309,42 @@ impl<'q> Walker<'q> {
         self.queue.pop_kernel()
     }
 
-    /// Walks on for one tick. An arc begins only where `arc_may_begin`.
-    pub fn step(&mut self, kernel: &Kernel, arc_may_begin: bool) -> RawStep<'_> {
+    /// The raw path `ahead` of real time further along the segment under way, if the raw point
+    /// moves on it and it reaches as far.
+    pub fn look_ahead(&self, ahead: TickTime) -> Option<Ahead> {
+        let (Walk::Moving(way), Some(segment)) = (&self.walk, self.queue.segment()) else {
+            return None;
+        };
+        if way.even_for == 0 {
+            return None;
+        }
+        let (progress, _) = way.ahead(segment, ahead)?;
+        Some(Ahead {
+            chord: segment.chord_point(to_unit(progress)),
+            even_for: way.even_for,
+        })
+    }
+
+    /// Goes on from there: what [`Walker::look_ahead`] has shown is the raw path from now on.
+    pub fn jump(&mut self, ahead: TickTime) {
+        if let (Walk::Moving(way), Some(segment)) = (&mut self.walk, self.queue.segment())
+            && let Some((progress, remaining)) = way.ahead(segment, ahead)
+        {
+            way.progress = progress;
+            way.remaining = remaining;
+        }
+    }
+
+    /// Leaves the segment under way, if there is one, as if it had ended.
+    pub fn leave(&mut self) {
+        if matches!(self.walk, Walk::Moving(_)) {
+            self.queue.pop();
+            self.walk = Walk::Standing(Stand::AT_REST);
+        }
+    }
+
+    /// Walks on for one tick. A segment begins only where it may, and an arc where an arc may.
+    pub fn step(&mut self, kernel: &Kernel, may_begin: MayBegin) -> RawStep<'_> {
         let Gone {
             ended,
             mut moved,
@@ -267,7 +353,7 @@ impl<'q> Walker<'q> {
         let segment = self.queue.segment();
         let mut began = false;
         if let Walk::Standing(stand) = &mut self.walk {
-            let next = segment.filter(|next| !self.held && (arc_may_begin || next.bow.is_none()));
+            let next = segment.filter(|next| !self.held && may_begin.allows(next));
             let way = next.and_then(|next| stand.begin(kernel, next, self.rates.of(next), left));
             match way {
                 Some(way) => {
@@ -285,12 +371,14 @@ impl<'q> Walker<'q> {
             began: None,
             progress: 0,
             moved,
+            changes_over: false,
         };
         if let (Walk::Moving(way), Some(segment)) = (&self.walk, segment) {
-            step.progress = (way.progress.min(WHOLE) >> 32) as i32;
+            step.progress = to_unit(way.progress);
             step.chord = segment.chord_point(step.progress);
             if began {
                 step.began = segment.bow.as_ref();
+                step.changes_over = segment.changes_over;
             }
             self.point = step.chord;
         }
@@ -308,6 +396,8 @@ impl<'q> Walker<'q> {
         };
         if self.held {
             way.since_corner = way.since_corner.wrapping_add(ONE_TICK);
+            way.pace = Rate::ZERO;
+            way.even_for = 0;
             return Gone {
                 ended: false,
                 moved: false,
@@ -319,6 +409,12 @@ impl<'q> Walker<'q> {
         let share = rate.raw(ONE_TICK);
         if way.remaining > share {
             way.advance(segment, share, ONE_TICK);
+            way.even_for = if way.pace == rate {
+                way.even_for.saturating_add(1)
+            } else {
+                1
+            };
+            way.pace = rate;
             return Gone {
                 ended: false,
                 moved,
@@ -342,6 +438,11 @@ impl<'q> Walker<'q> {
             left,
         }
     }
+}
+
+/// Progress in 2^-62 as one in 2^-30.
+fn to_unit(progress: u64) -> i32 {
+    (progress.min(WHOLE) >> 32) as i32
 }
 
 /// `rate` (a whole tick's) for a time of a few ticks, rounded down, without overflow.

@@ -6,6 +6,7 @@ use core::fmt;
 use heapless::Vec;
 
 use super::course::{Course, between};
+use super::follow::ShortestConfig;
 use crate::prefilter::{Band, Kernel, Kind, Mode, Prefilter, PrefilterConfig, residual};
 
 /// What a prefilter has to achieve.
@@ -259,6 +260,152 @@ pub fn choose(requirement: &Requirement, kinds: &[Kind]) -> Result<Choice, Choic
             .min_by(|(_, one), (_, other)| one.total_cmp(other)),
     })
 }
+
+/// Which prefilter is the shortest for how much the mode may be off, worked out once.
+///
+/// Lengths and residuals scale with the frequency, so that one table holds for every place of
+/// a map, and a look into it costs nothing.
+#[derive(Clone, Debug)]
+pub struct Shortest {
+    /// Shortest first: each kind with how far the mode may be off, uncertainty included.
+    reach: Vec<(Kind, f32), { Kind::ALL.len() }>,
+    config: ShortestConfig,
+}
+
+/// No prefilter keeps the residual allowed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShortestError {
+    /// The uncertainty or the residual allowed is out of range.
+    Value(ChoiceError),
+    /// Every prefilter leaves more.
+    None {
+        /// What was asked for.
+        config: ShortestConfig,
+        /// The frequency's uncertainty that one prefilter at least allows for.
+        most: f32,
+    },
+}
+
+impl fmt::Display for ShortestError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Value(error) => error.fmt(f),
+            Self::None { config, most } => write!(
+                f,
+                "no prefilter's residual stays below {} % of a mode known to {} %, only to {:.1} %: allow more, or measure the mode",
+                Percent(config.limit.into()),
+                Percent(config.uncertainty.into()),
+                100.0 * most
+            ),
+        }
+    }
+}
+
+impl Shortest {
+    /// The table for modes of these damping ratios.
+    ///
+    /// Cost on a Cortex-M4F: some ten million instructions, once for a robot.
+    ///
+    /// # Errors
+    /// [`ShortestError`] if a value is out of range or no prefilter will do.
+    pub fn new(
+        modes: impl Iterator<Item = Mode> + Clone,
+        config: &ShortestConfig,
+    ) -> Result<Self, ShortestError> {
+        let one_hz = |damping| Mode {
+            frequency_hz: 1.0,
+            damping,
+        };
+        let dampings = modes.map(|mode| mode.damping);
+        let least = one_hz(dampings.clone().fold(0.5, f64::min));
+        let most = one_hz(dampings.fold(0.0, f64::max));
+        let (uncertainty, limit) = (f64::from(config.uncertainty), f64::from(config.limit));
+        Requirement::new(&most, uncertainty, limit).map_err(ShortestError::Value)?;
+        let mut all: Vec<(Kind, f32, f64), { Kind::ALL.len() }> = Vec::new();
+        for (kind, prefilter) in made_for(&most, &Kind::ALL) {
+            let reach = [&least, &most].map(|mode| reach(kind, mode, limit));
+            let reach = reach.into_iter().fold(f64::INFINITY, f64::min) as f32;
+            // there is room for every kind
+            let _ = all.push((kind, reach, prefilter.length_s()));
+        }
+        all.sort_unstable_by(|(_, reach, length_s), (_, other_reach, other_s)| {
+            length_s
+                .total_cmp(other_s)
+                .then(other_reach.total_cmp(reach))
+        });
+        let furthest = all.iter().map(|(_, reach, _)| *reach).fold(0.0, f32::max);
+        if furthest < config.uncertainty {
+            return Err(ShortestError::None {
+                config: *config,
+                most: furthest,
+            });
+        }
+        Ok(Self {
+            reach: all
+                .into_iter()
+                .map(|(kind, reach, _)| (kind, reach))
+                .collect(),
+            config: *config,
+        })
+    }
+
+    /// The shortest for a mode that is off by up to `off` (a fraction) besides what it is not
+    /// known to; the one that comes closest if none will do.
+    #[must_use]
+    pub fn kind(&self, off: f64) -> Kind {
+        let wanted = self.config.uncertainty + off as f32;
+        let found = self.reach.iter().find(|(_, reach)| *reach >= wanted);
+        found.map_or(self.longest(), |(kind, _)| *kind)
+    }
+
+    /// The one that allows for the most: none that is ever chosen is longer.
+    #[must_use]
+    pub fn longest(&self) -> Kind {
+        let all = self.reach.iter();
+        let furthest = all.max_by(|(_, one), (_, other)| one.total_cmp(other));
+        furthest.map_or(Kind::None, |(kind, _)| *kind)
+    }
+}
+
+/// How far the mode may be off, as a fraction, for no more than `limit` to be left of it: good
+/// to 0.03 %, and never too much but by what the residual does within a percent.
+fn reach(kind: Kind, nominal: &Mode, limit: f64) -> f64 {
+    let Some((_, prefilter)) = made_for(nominal, &[kind]).next() else {
+        return -1.0;
+    };
+    let keeps = |off: f64| {
+        [1.0 - off, 1.0 + off].into_iter().all(|ratio| {
+            let mode = Mode {
+                frequency_hz: nominal.frequency_hz * ratio,
+                ..*nominal
+            };
+            residual(&prefilter, &mode) <= limit + MARGIN
+        })
+    };
+    if !keeps(0.0) {
+        return -1.0;
+    }
+    let mut inside = 0.0;
+    while inside < FURTHEST && keeps(inside + REACH_STEP) {
+        inside += REACH_STEP;
+    }
+    let mut outside = inside + REACH_STEP;
+    for _ in 0..5 {
+        let middle = (inside + outside) / 2.0;
+        if keeps(middle) {
+            inside = middle;
+        } else {
+            outside = middle;
+        }
+    }
+    inside
+}
+
+/// Steps of the search for how far a mode may be off.
+const REACH_STEP: f64 = 0.01;
+
+/// The furthest that it is looked for.
+const FURTHEST: f64 = 0.6;
 
 /// Those prefilters that can be made for a mode, the shortest first.
 fn made_for(mode: &Mode, kinds: &[Kind]) -> impl Iterator<Item = (Kind, Prefilter)> {

@@ -2,55 +2,126 @@
 
 use core::fmt;
 
-use heapless::Vec;
-
 use super::course::{Course, between};
 use crate::path::PathSegment;
 use crate::pose::Pose;
 use crate::prefilter::Mode;
 
 /// Nodes of a map along X and along Y: with 8, frequencies from 8 to 20 Hz over an arm of
-/// 350 mm go in steps that a straight line follows within 1 %. 512 bytes altogether.
+/// 350 mm go in steps that a straight line follows within 1 %. 256 bytes altogether.
 pub const MAP_NODES: usize = 8;
 
 const NODES: usize = MAP_NODES * MAP_NODES;
 
-/// The mode as measured at a place.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The mode as measured at a place, as small as its use allows: 4 bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MapNode {
-    /// Natural frequency (undamped), 0.01 to 250 Hz.
-    pub frequency_hz: f32,
-    /// Damping ratio, 0 to 0.5.
-    pub damping: f32,
+    /// Natural frequency (undamped) in 2^-8 Hz: up to 255 Hz, within 0.002 Hz.
+    frequency: u16,
+    /// Damping ratio in 2^-16: up to 0.5, within 1e-5.
+    damping: u16,
+}
+
+impl MapNode {
+    /// Bytes of a node as it is kept.
+    pub const BYTES: usize = 4;
+
+    /// A mode of a natural frequency of 0.01 to 250 Hz and a damping ratio of 0 to 0.5, each
+    /// rounded to nearest; what is further off saturates, and is refused with the map.
+    #[must_use]
+    pub fn new(frequency_hz: f32, damping: f32) -> Self {
+        Self {
+            frequency: (frequency_hz * 256.0 + 0.5) as u16,
+            damping: (damping * 65_536.0 + 0.5) as u16,
+        }
+    }
+
+    /// Natural frequency (undamped) in Hz.
+    #[must_use]
+    pub fn frequency_hz(self) -> f32 {
+        f32::from(self.frequency) / 256.0
+    }
+
+    /// Damping ratio.
+    #[must_use]
+    pub fn damping(self) -> f32 {
+        f32::from(self.damping) / 65_536.0
+    }
+
+    /// As kept.
+    #[must_use]
+    pub fn to_bytes(self) -> [u8; Self::BYTES] {
+        let ([f0, f1], [d0, d1]) = (self.frequency.to_le_bytes(), self.damping.to_le_bytes());
+        [f0, f1, d0, d1]
+    }
+
+    /// The inverse of [`MapNode::to_bytes`].
+    #[must_use]
+    pub fn from_bytes([f0, f1, d0, d1]: [u8; Self::BYTES]) -> Self {
+        Self {
+            frequency: u16::from_le_bytes([f0, f1]),
+            damping: u16::from_le_bytes([d0, d1]),
+        }
+    }
 }
 
 /// Settings of a map.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModeMapConfig {
     /// X of the first and of the last column in mm.
     pub x_mm: [f32; 2],
     /// Y of the first and of the last row in mm.
     pub y_mm: [f32; 2],
-    /// Columns, 1 to [`MAP_NODES`]; with one, the mode does not depend on X.
-    pub columns: usize,
+    /// Columns, 1 to [`MAP_NODES`]; with one, the mode does not depend on X. 0 is no map.
+    pub columns: u8,
     /// Rows, 1 to [`MAP_NODES`]; with one, the mode does not depend on Y.
-    pub rows: usize,
+    pub rows: u8,
     /// The modes at evenly spaced places, row after row from the lowest Y, each from the
-    /// lowest X.
-    pub nodes: Vec<MapNode, NODES>,
+    /// lowest X; those behind columns times rows do not count.
+    pub nodes: [MapNode; NODES],
 }
 
 impl ModeMapConfig {
+    /// No map.
+    pub const NONE: Self = Self {
+        x_mm: [0.0, 1.0],
+        y_mm: [0.0, 1.0],
+        columns: 0,
+        rows: 0,
+        nodes: [MapNode {
+            frequency: 0,
+            damping: 0,
+        }; NODES],
+    };
+
     /// The same mode everywhere.
     #[must_use]
     pub fn constant(node: MapNode) -> Self {
         Self {
-            x_mm: [0.0, 1.0],
-            y_mm: [0.0, 1.0],
             columns: 1,
             rows: 1,
-            nodes: Vec::from_iter([node]),
+            nodes: [node; NODES],
+            ..Self::NONE
         }
+    }
+
+    /// Whether there is a map.
+    #[must_use]
+    pub fn is_some(&self) -> bool {
+        self.columns > 0
+    }
+
+    /// The nodes that count.
+    #[must_use]
+    pub fn used(&self) -> &[MapNode] {
+        let count = usize::from(self.columns) * usize::from(self.rows);
+        self.nodes.get(..count).unwrap_or(&self.nodes)
+    }
+}
+
+impl Default for ModeMapConfig {
+    fn default() -> Self {
+        Self::NONE
     }
 }
 
@@ -60,16 +131,9 @@ pub enum MapError {
     /// Columns or rows are not 1 to [`MAP_NODES`].
     Size {
         /// Columns given.
-        columns: usize,
+        columns: u8,
         /// Rows given.
-        rows: usize,
-    },
-    /// There is not one node for each column and row.
-    Nodes {
-        /// Nodes given.
-        given: usize,
-        /// Columns times rows.
-        wanted: usize,
+        rows: u8,
     },
     /// The last column or row does not lie at least 1 mm behind the first, or beyond ±4 m.
     Place {
@@ -99,10 +163,6 @@ impl fmt::Display for MapError {
                 f,
                 "a map of {columns} by {rows} modes does not fit: give 1 to {MAP_NODES} columns and rows"
             ),
-            Self::Nodes { given, wanted } => write!(
-                f,
-                "the map has {given} modes and room for {wanted}: give one for each column and row"
-            ),
             Self::Place { axis } => write!(
                 f,
                 "the map's last place along {axis} does not lie 1 mm or more behind its first, within ±4096 mm"
@@ -126,7 +186,7 @@ impl core::error::Error for MapError {}
 pub struct ModeMap {
     x: Axis,
     y: Axis,
-    nodes: Vec<MapNode, NODES>,
+    nodes: [MapNode; NODES],
 }
 
 /// Where the nodes lie along an axis.
@@ -166,14 +226,9 @@ impl ModeMap {
     /// [`MapError`] names the first one that is out of range.
     pub fn new(config: &ModeMapConfig) -> Result<Self, MapError> {
         let (columns, rows) = (config.columns, config.rows);
-        if !(1..=MAP_NODES).contains(&columns) || !(1..=MAP_NODES).contains(&rows) {
+        let fits = |count: u8| (1..=MAP_NODES).contains(&usize::from(count));
+        if !fits(columns) || !fits(rows) {
             return Err(MapError::Size { columns, rows });
-        }
-        if config.nodes.len() != columns * rows {
-            return Err(MapError::Nodes {
-                given: config.nodes.len(),
-                wanted: columns * rows,
-            });
         }
         for (axis, [first, last]) in [('X', config.x_mm), ('Y', config.y_mm)] {
             let within = |place: f32| (-4096.0..=4096.0).contains(&place);
@@ -182,11 +237,8 @@ impl ModeMap {
                 return Err(MapError::Place { axis });
             }
         }
-        for (node, mode) in config.nodes.iter().enumerate() {
-            let MapNode {
-                frequency_hz,
-                damping,
-            } = *mode;
+        for (node, mode) in config.used().iter().enumerate() {
+            let (frequency_hz, damping) = (mode.frequency_hz(), mode.damping());
             if !(0.01..=250.0).contains(&frequency_hz) {
                 return Err(MapError::Frequency { node, frequency_hz });
             }
@@ -195,9 +247,9 @@ impl ModeMap {
             }
         }
         Ok(Self {
-            x: Axis::new(config.x_mm, columns),
-            y: Axis::new(config.y_mm, rows),
-            nodes: config.nodes.clone(),
+            x: Axis::new(config.x_mm, columns.into()),
+            y: Axis::new(config.y_mm, rows.into()),
+            nodes: config.nodes,
         })
     }
 
@@ -210,16 +262,23 @@ impl ModeMap {
         let node = |column, row| {
             let found = self.nodes.get(row * (self.x.steps + 1) + column);
             // every column and row has its node
-            found.map_or(
-                Mode {
-                    frequency_hz: 0.0,
-                    damping: 0.0,
-                },
-                Mode::from,
-            )
+            found.map_or(NO_MODE, Mode::from)
         };
         let along_x = |row| between(node(left, row), node(right, row), u);
         between(along_x(front), along_x(back), v)
+    }
+
+    /// The lowest frequency with the largest damping ratio: no mode of the map has a longer
+    /// damped period.
+    #[must_use]
+    pub fn slowest(&self) -> Mode {
+        let count = (self.x.steps + 1) * (self.y.steps + 1);
+        let all = self.nodes.iter().take(count).map(Mode::from);
+        all.reduce(|one, other| Mode {
+            frequency_hz: one.frequency_hz.min(other.frequency_hz),
+            damping: one.damping.max(other.damping),
+        })
+        .unwrap_or(NO_MODE)
     }
 
     /// The mode along a segment, from its values at both ends.
@@ -233,11 +292,17 @@ impl ModeMap {
     }
 }
 
+/// What a node is that does not exist: there is none such.
+const NO_MODE: Mode = Mode {
+    frequency_hz: 0.0,
+    damping: 0.0,
+};
+
 impl From<&MapNode> for Mode {
     fn from(node: &MapNode) -> Self {
         Self {
-            frequency_hz: node.frequency_hz.into(),
-            damping: node.damping.into(),
+            frequency_hz: node.frequency_hz().into(),
+            damping: node.damping().into(),
         }
     }
 }
@@ -263,19 +328,18 @@ mod tests {
             1 => 0.0,
             _ => 700.0 * node as f64 / (nodes - 1) as f64 - 350.0,
         };
-        let nodes = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
-        let config = ModeMapConfig {
+        let mut config = ModeMapConfig {
             x_mm: [-350.0, 350.0],
             y_mm: [-350.0, 350.0],
-            columns,
-            rows,
-            nodes: nodes
-                .map(|(column, row)| MapNode {
-                    frequency_hz: mode(place(column, columns), place(row, rows)) as f32,
-                    damping: 0.02,
-                })
-                .collect(),
+            columns: columns as u8,
+            rows: rows as u8,
+            ..ModeMapConfig::NONE
         };
+        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)))
+        {
+            let frequency_hz = mode(place(column, columns), place(row, rows)) as f32;
+            config.nodes[row * columns + column] = MapNode::new(frequency_hz, 0.02);
+        }
         ModeMap::new(&config).unwrap()
     }
 
@@ -291,12 +355,12 @@ mod tests {
             let (left, right, _) = map.x.locate(x_mm);
             let (front, back, _) = map.y.locate(y_mm);
             let around = [(left, front), (right, front), (left, back), (right, back)]
-                .map(|(column, row)| f64::from(map.nodes[row * columns + column].frequency_hz));
+                .map(|(column, row)| f64::from(map.nodes[row * columns + column].frequency_hz()));
             let (low, high) = around
                 .iter()
                 .fold((f64::MAX, 0.0_f64), |(low, high), &f| (low.min(f), high.max(f)));
             prop_assert!(found.frequency_hz >= low - 1e-9 && found.frequency_hz <= high + 1e-9);
-            prop_assert_eq!(found.damping, f64::from(0.02_f32));
+            prop_assert!(libm::fabs(found.damping - 0.02) < 1e-5);
         }
 
         #[test]
@@ -305,7 +369,7 @@ mod tests {
         ) {
             let even = |x: f64, y: f64| 14.0 + 0.01 * x - 0.005 * y;
             let found = map(5, 3, even).mode_at(&pose(x_mm, y_mm)).frequency_hz;
-            prop_assert!(libm::fabs(found - even(x_mm, y_mm)) < 1e-5);
+            prop_assert!(libm::fabs(found - even(x_mm, y_mm)) < 0.002);
         }
     }
 
@@ -335,33 +399,28 @@ mod tests {
         assert_eq!(course.end.frequency_hz, 20.0);
         assert_eq!(course.length_mm, 750.0);
         assert_eq!(course.mode_at(375.0).frequency_hz, 14.0);
-        let everywhere = ModeMapConfig::constant(MapNode {
-            frequency_hz: 6.34,
-            damping: 0.022,
-        });
+        let everywhere = ModeMapConfig::constant(MapNode::new(6.34, 0.022));
         let mode = ModeMap::new(&everywhere)
             .unwrap()
             .mode_at(&pose(-300.0, 10.0));
-        assert_eq!(mode.frequency_hz, f64::from(6.34_f32));
+        assert!(libm::fabs(mode.frequency_hz - 6.34) < 0.002);
     }
 
     #[test]
     fn settings_that_make_no_map_are_refused_by_name() {
-        let good = ModeMapConfig::constant(MapNode {
-            frequency_hz: 6.34,
-            damping: 0.022,
-        });
+        let good = ModeMapConfig::constant(MapNode::new(6.34, 0.022));
         let refused = |change: fn(&mut ModeMapConfig)| {
-            let mut config = good.clone();
+            let mut config = good;
             change(&mut config);
             std::format!("{}", ModeMap::new(&config).unwrap_err())
         };
         assert!(refused(|c| c.columns = 9).contains("a map of 9 by 1"));
         assert!(refused(|c| c.rows = 0).contains("a map of 1 by 0"));
-        assert!(refused(|c| c.columns = 2).contains("1 modes and room for 2"));
         assert!(refused(|c| c.y_mm = [3.0, 3.0]).contains("along Y"));
         assert!(refused(|c| c.x_mm = [f32::NAN, 3.0]).contains("along X"));
-        assert!(refused(|c| c.nodes[0].frequency_hz = 0.0).contains("frequency of 0 Hz"));
-        assert!(refused(|c| c.nodes[0].damping = 0.7).contains("damping ratio of 0.7"));
+        assert!(refused(|c| c.nodes[0] = MapNode::new(0.0, 0.1)).contains("frequency of 0 Hz"));
+        assert!(
+            refused(|c| c.nodes[0] = MapNode::new(9.0, 0.75)).contains("damping ratio of 0.75")
+        );
     }
 }

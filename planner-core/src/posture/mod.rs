@@ -13,14 +13,19 @@
 
 mod automatic;
 mod course;
+mod follow;
 mod map;
 mod method;
 mod profile;
 mod ramp;
 mod zeros;
 
-pub use automatic::{Choice, ChoiceError, Requirement, choose};
+pub use automatic::{Choice, ChoiceError, Requirement, Shortest, ShortestError, choose};
 pub use course::Course;
+pub use follow::{
+    FollowConfig, FollowError, Follower, MoveToFollow, MoveTunings, PostureMethod, ShortestConfig,
+    Tuning,
+};
 pub use map::{MAP_NODES, MapError, MapNode, ModeMap, ModeMapConfig};
 pub use method::{Method, MethodChoice, Reason};
 pub use profile::{Profile, ProfileError, ProfileState};

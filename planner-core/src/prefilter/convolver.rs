@@ -1,10 +1,40 @@
 //! The prefilter at run time: a delay line and, for each box, a running sum.
 
 use super::MAX_STAGES;
-use super::kernel::{Kernel, SLOTS, Tap, Taps, WEIGHT_BITS};
+use super::kernel::{HALF_SLOTS, Kernel, SLOTS, Tap, Taps, WEIGHT_BITS};
 
 /// The output has this many bits below the input's.
 pub const FINE_BITS: u32 = 13;
+
+/// Where a filter's samples lie in a delay line that it may share with another one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Part {
+    first: usize,
+    mask: usize,
+}
+
+impl Part {
+    const WHOLE: Self = Self {
+        first: 0,
+        mask: SLOTS - 1,
+    };
+
+    /// The first or the second half.
+    const fn half(which: usize) -> Self {
+        Self {
+            first: (which & 1) * HALF_SLOTS,
+            mask: HALF_SLOTS - 1,
+        }
+    }
+
+    /// A place in the line; the last remainder only tells the compiler what holds anyway.
+    const fn slot(self, at: usize) -> usize {
+        (self.first | (at & self.mask)) % SLOTS
+    }
+}
+
+/// The samples of a delay line, a slot a tick.
+type Line<const AXES: usize> = [[i32; AXES]; SLOTS];
 
 /// Filters `AXES` coordinates that share one prefilter, a sample a tick.
 ///
@@ -15,15 +45,8 @@ pub const FINE_BITS: u32 = 13;
 /// Cost on a Cortex-M4F: about 15 instructions a tap and axis, whatever the length.
 #[derive(Clone, Debug)]
 pub struct Convolver<const AXES: usize> {
-    line: [[i32; AXES]; SLOTS],
-    /// Slot of the newest sample of the first stage.
-    head: usize,
-    /// Running sums of the boxes, by stage, in 2^-30 of the input's unit.
-    sums: [[i64; AXES]; MAX_STAGES],
-    /// Samples from before the reset read as this.
-    rest: [i32; AXES],
-    /// Samples since the reset.
-    age: usize,
+    line: Line<AXES>,
+    filter: Filter<AXES>,
 }
 
 impl<const AXES: usize> Default for Convolver<AXES> {
@@ -38,10 +61,7 @@ impl<const AXES: usize> Convolver<AXES> {
     pub const fn new() -> Self {
         Self {
             line: [[0; AXES]; SLOTS],
-            head: 0,
-            sums: [[0; AXES]; MAX_STAGES],
-            rest: [0; AXES],
-            age: 0,
+            filter: Filter::new(),
         }
     }
 
@@ -49,21 +69,117 @@ impl<const AXES: usize> Convolver<AXES> {
     ///
     /// Constant cost: the delay line is not touched, its old samples just no longer count.
     pub fn reset(&mut self, rest: [i32; AXES]) {
-        self.rest = rest;
-        self.age = 0;
-        self.sums = [rest.map(|value| i64::from(value) << WEIGHT_BITS); MAX_STAGES];
+        self.filter.reset(rest);
     }
 
     /// Takes the input of this tick, returns the output in 2^-[`FINE_BITS`] of its unit.
     #[must_use]
     pub fn process(&mut self, kernel: &Kernel, input: [i32; AXES]) -> [i64; AXES] {
+        self.filter
+            .process(&mut self.line, Part::WHOLE, kernel, input)
+    }
+}
+
+/// Two filters of `AXES` coordinates in the memory of one [`Convolver`]: while they share it,
+/// each has a half of the delay line and takes kernels of up to [`HALF_SLOTS`]; otherwise the
+/// first one has all of it.
+#[derive(Clone, Debug)]
+pub struct ConvolverPair<const AXES: usize> {
+    line: Line<AXES>,
+    filters: [Filter<AXES>; 2],
+    is_shared: bool,
+}
+
+impl<const AXES: usize> Default for ConvolverPair<AXES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const AXES: usize> ConvolverPair<AXES> {
+    /// Both at rest at zero, the first one with the whole delay line.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            line: [[0; AXES]; SLOTS],
+            filters: [const { Filter::new() }; 2],
+            is_shared: false,
+        }
+    }
+
+    /// Whether they share the delay line. Both have to be reset after it has been changed.
+    pub fn share(&mut self, is_shared: bool) {
+        self.is_shared = is_shared;
+    }
+
+    /// Whether they share the delay line.
+    #[must_use]
+    pub fn is_shared(&self) -> bool {
+        self.is_shared
+    }
+
+    /// As [`Convolver::reset`], of the first (`false`) or the second one.
+    pub fn reset(&mut self, second: bool, rest: [i32; AXES]) {
+        self.filters[usize::from(second)].reset(rest);
+    }
+
+    /// As [`Convolver::process`], of the first (`false`) or the second one.
+    #[must_use]
+    pub fn process(&mut self, second: bool, kernel: &Kernel, input: [i32; AXES]) -> [i64; AXES] {
+        let which = usize::from(second);
+        let part = if self.is_shared {
+            Part::half(which)
+        } else {
+            Part::WHOLE
+        };
+        self.filters[which].process(&mut self.line, part, kernel, input)
+    }
+}
+
+/// What a filter remembers beside its samples.
+#[derive(Clone, Debug)]
+struct Filter<const AXES: usize> {
+    /// Slot of the newest sample of the first stage.
+    head: usize,
+    /// Running sums of the boxes, by stage, in 2^-30 of the input's unit.
+    sums: [[i64; AXES]; MAX_STAGES],
+    /// Samples from before the reset read as this.
+    rest: [i32; AXES],
+    /// Samples since the reset.
+    age: usize,
+}
+
+impl<const AXES: usize> Filter<AXES> {
+    const fn new() -> Self {
+        Self {
+            head: 0,
+            sums: [[0; AXES]; MAX_STAGES],
+            rest: [0; AXES],
+            age: 0,
+        }
+    }
+
+    fn reset(&mut self, rest: [i32; AXES]) {
+        self.rest = rest;
+        self.age = 0;
+        self.sums = [rest.map(|value| i64::from(value) << WEIGHT_BITS); MAX_STAGES];
+    }
+
+    fn process(
+        &mut self,
+        line: &mut Line<AXES>,
+        part: Part,
+        kernel: &Kernel,
+        input: [i32; AXES],
+    ) -> [i64; AXES] {
         self.head = self.head.wrapping_sub(1);
         let mut total = input.map(|value| i64::from(value) << WEIGHT_BITS);
         for (stage, sums) in kernel.stages.iter().zip(&mut self.sums) {
-            let newest = self.head.wrapping_add(usize::from(stage.first_slot)) % SLOTS;
-            self.line[newest] = total.map(|value| round_off(value, WEIGHT_BITS) as i32);
+            let newest = part.slot(self.head.wrapping_add(usize::from(stage.first_slot)));
+            line[newest] = total.map(|value| round_off(value, WEIGHT_BITS) as i32);
             let delayed = Delayed {
-                line: &self.line,
+                line,
+                part,
                 head: self.head,
                 age: self.age,
                 rest: &self.rest,
@@ -86,7 +202,8 @@ impl<const AXES: usize> Convolver<AXES> {
 
 /// The delay line as a stage reads it.
 struct Delayed<'a, const AXES: usize> {
-    line: &'a [[i32; AXES]; SLOTS],
+    line: &'a Line<AXES>,
+    part: Part,
     head: usize,
     age: usize,
     rest: &'a [i32; AXES],
@@ -98,7 +215,9 @@ impl<const AXES: usize> Delayed<'_, AXES> {
         let samples: [&[i32; AXES]; TAPS] = core::array::from_fn(|i| {
             let tap = &taps[i];
             if usize::from(tap.delay) <= self.age {
-                &self.line[self.head.wrapping_add(usize::from(tap.slot)) % SLOTS]
+                &self.line[self
+                    .part
+                    .slot(self.head.wrapping_add(usize::from(tap.slot)))]
             } else {
                 self.rest
             }

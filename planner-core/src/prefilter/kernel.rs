@@ -10,6 +10,9 @@ use crate::units::{TICK_HZ, TICK_S};
 /// fractional delays. A power of two, so that an index is masked and never out of bounds.
 pub const SLOTS: usize = 1024;
 
+/// Slots of half a delay line, for each of two filters that share it: prefilters of up to 0.5 s.
+pub const HALF_SLOTS: usize = SLOTS / 2;
+
 /// Weights count in 2^-30; those of a stage sum to exactly 2^30.
 pub(super) const WEIGHT_BITS: u32 = 30;
 
@@ -63,6 +66,24 @@ impl StageTaps {
             Taps::Five(taps) => taps,
         }
     }
+
+    /// The mean delay, exactly that of the rounded weights.
+    ///
+    /// ```text
+    /// shaper: Σ w_i d_i        box: Σ n Σ_{d_j ≤ n} c_j = −Σ c_j d_j (d_j − 1) / 2,   as Σ c_j = 0
+    /// ```
+    fn centroid(&self) -> TickTime {
+        let is_box = matches!(self.taps, Taps::Box(_));
+        let moments = self.list().iter().map(|tap| {
+            let (delay, weight) = (i64::from(tap.delay), i64::from(tap.weight));
+            if is_box {
+                -weight * (delay * (delay - 1) / 2)
+            } else {
+                weight * delay
+            }
+        });
+        moments.sum::<i64>() << (32 - WEIGHT_BITS)
+    }
 }
 
 /// A prefilter's taps for the tick.
@@ -90,6 +111,7 @@ pub struct Kernel {
     delay_ticks: u16,
     length: TickTime,
     has_long_box: bool,
+    centroid: TickTime,
 }
 
 impl Kernel {
@@ -133,6 +155,7 @@ impl Kernel {
             }
         }
         Ok(Self {
+            centroid: stages.iter().map(StageTaps::centroid).sum(),
             stages,
             length_ticks: first_slot,
             delay_ticks: delays,
@@ -145,6 +168,13 @@ impl Kernel {
     #[must_use]
     pub fn length(&self) -> TickTime {
         self.length
+    }
+
+    /// `m`, the mean delay: how far the output of a steady motion is behind. It is exactly that
+    /// of the integer taps.
+    #[must_use]
+    pub fn centroid(&self) -> TickTime {
+        self.centroid
     }
 
     /// How long the raw path stands at an exact stop, when it arrives `until_tick` before a tick.

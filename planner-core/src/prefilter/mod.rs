@@ -17,8 +17,8 @@ mod shapers;
 
 pub use cascade::{MAX_STAGES, Prefilter, Stage};
 pub use config::{CustomImpulse, EI_RESIDUAL, PrefilterConfig, PrefilterError, SecondMode};
-pub use convolver::{Convolver, FINE_BITS};
-pub use kernel::{Kernel, SLOTS};
+pub use convolver::{Convolver, ConvolverPair, FINE_BITS};
+pub use kernel::{HALF_SLOTS, Kernel, SLOTS};
 pub use kind::Kind;
 pub use mode::Mode;
 pub use residual::{Band, insensitivity, residual};

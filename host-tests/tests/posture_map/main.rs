@@ -1,0 +1,4 @@
+//! Programs on a robot whose mode depends on the posture, and which has a map of it.
+
+mod promises;
+mod support;
