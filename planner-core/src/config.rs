@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use crate::corner::CornerRule;
 use crate::kinematics::{Elbow, Scara, ScaraConfig, ScaraError};
 use crate::prefilter::{Kernel, Kind, Prefilter, PrefilterConfig, PrefilterError, Response};
 
@@ -14,6 +15,9 @@ pub struct RobotConfig {
     pub prefilter: PrefilterConfig,
     /// Corner tolerance in mm where the program gives none, 0 to 100; 0 stops at corners.
     pub corner_tolerance_mm: f32,
+    /// Corner overlap in percent where the program gives no tolerance, above 0 to 100: instead of
+    /// the tolerance, which is not promised then. 0 rounds corners by their tolerance.
+    pub corner_overlap_percent: f32,
     /// Feedrate of `G0` in mm/s, above 0 to 10 000.
     pub rapid_mm_s: f32,
     /// Fastest feedrate in mm/s, above 0 to 10 000; a program that asks for more gets this.
@@ -30,6 +34,7 @@ impl Default for RobotConfig {
             scara: ScaraConfig::default(),
             prefilter: PrefilterConfig::default(),
             corner_tolerance_mm: 0.5,
+            corner_overlap_percent: 0.0,
             rapid_mm_s: 160.0,
             feed_limit_mm_s: 1000.0,
             yaw_limit_deg_s: 360.0,
@@ -115,6 +120,7 @@ impl Robot {
     pub fn new(config: &RobotConfig) -> Result<Self, ConfigError> {
         let checks = [
             ("tolerance", config.corner_tolerance_mm, 0.0, 100.0),
+            ("overlap", config.corner_overlap_percent, 0.0, 100.0),
             ("rapid", config.rapid_mm_s, 0.001, 10_000.0),
             ("feed-limit", config.feed_limit_mm_s, 0.001, 10_000.0),
             ("yaw-limit", config.yaw_limit_deg_s, 0.001, 10_000.0),
@@ -209,9 +215,19 @@ impl fmt::Display for SettingValue {
 }
 
 impl RobotConfig {
+    /// How corners are passed where the program does not say.
+    #[must_use]
+    pub fn corner(&self) -> CornerRule {
+        if self.corner_overlap_percent > 0.0 {
+            CornerRule::OverlapPercent(self.corner_overlap_percent)
+        } else {
+            CornerRule::ToleranceMm(self.corner_tolerance_mm)
+        }
+    }
+
     /// Names of all settings, in groups whose values must fit each other: lengths in mm, angles
     /// in °, the frequency in Hz, feedrates in mm/s, the yaw limit in °/s.
-    pub const GROUPS: [&'static [&'static str]; 11] = [
+    pub const GROUPS: [&'static [&'static str]; 12] = [
         &["link1", "link2"],
         &["elbow", "joint2-min", "joint2-max", "singularity-margin"],
         &["joint1-min", "joint1-max"],
@@ -219,6 +235,7 @@ impl RobotConfig {
         &["joint4-min", "joint4-max"],
         &["prefilter", "frequency", "damping"],
         &["tolerance"],
+        &["overlap"],
         &["rapid"],
         &["feed-limit"],
         &["yaw-limit"],
@@ -302,6 +319,7 @@ impl RobotConfig {
             "frequency" => Slot::Number(&mut self.prefilter.frequency_hz),
             "damping" => Slot::Number(&mut self.prefilter.damping),
             "tolerance" => Slot::Number(&mut self.corner_tolerance_mm),
+            "overlap" => Slot::Number(&mut self.corner_overlap_percent),
             "rapid" => Slot::Number(&mut self.rapid_mm_s),
             "feed-limit" => Slot::Number(&mut self.feed_limit_mm_s),
             "yaw-limit" => Slot::Number(&mut self.yaw_limit_deg_s),
@@ -379,6 +397,7 @@ mod tests {
     fn a_robot_is_refused_by_the_name_of_its_setting() {
         for (text, name) in [
             ("tolerance=-1", "tolerance"),
+            ("overlap=101", "overlap"),
             ("rapid=0", "rapid"),
             ("feed-limit=NaN", "feed-limit"),
             ("yaw-limit=inf", "yaw-limit"),

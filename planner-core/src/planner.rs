@@ -373,7 +373,7 @@ impl<'q> Planner<'q> {
                     &self.robot,
                     &order.path,
                     timing,
-                    order.corner_tolerance_mm,
+                    order.corner,
                     order.line,
                 );
         }
@@ -534,7 +534,7 @@ impl<'q> Planner<'q> {
 
 fn defaults(robot: &Robot) -> Defaults {
     Defaults {
-        corner_tolerance_mm: robot.config.corner_tolerance_mm,
+        corner: robot.config.corner(),
         prefilter: robot.config.prefilter,
         elbow: robot.config.scara.elbow,
         first_point_declares: true,

@@ -3,7 +3,9 @@
 use std::f64::consts::{PI, TAU};
 
 /// Names that [`Prefilter::named`] knows, by increasing length.
-pub const NAMES: [&str; 7] = ["none", "zv", "zvd", "ei", "fir", "fir-zv", "fir-zvd"];
+pub const NAMES: [&str; 8] = [
+    "none", "zv", "zvd", "ei", "fir", "fir-zv", "fir-zvd", "s-curve",
+];
 
 /// Residual that the EI shaper allows at its nominal frequency.
 const EI_RESIDUAL: f64 = 0.05;
@@ -70,6 +72,7 @@ impl Prefilter {
             "fir" => (none, &[period]),
             "fir-zv" => (zv, &[period]),
             "fir-zvd" => (zvd, &[period]),
+            "s-curve" => (none, &[period, period]),
             _ => return None,
         };
         Some(Self::new(&impulses, boxes))
@@ -297,7 +300,7 @@ mod tests {
     #[test]
     fn lengths_are_those_of_the_model() {
         let period = 1.0 / (6.34 * (1.0_f64 - 0.022 * 0.022).sqrt());
-        let lengths = [0.0, 0.5, 1.0, 1.0, 1.0, 1.5, 2.0];
+        let lengths = [0.0, 0.5, 1.0, 1.0, 1.0, 1.5, 2.0, 2.0];
         for (name, expected) in NAMES.into_iter().zip(lengths) {
             let filter = Prefilter::named(name, 6.34, 0.022).unwrap();
             close(filter.length_s(), expected * period, 1e-15);

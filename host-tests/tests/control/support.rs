@@ -87,7 +87,7 @@ pub fn report(robot: &Robot, program: &str, setpoints: &[Setpoint]) -> Report {
 pub fn allowance_mm(kind: Kind, feed_mm_s: f64) -> f64 {
     match kind {
         Kind::None | Kind::Zv | Kind::Zvd | Kind::Ei => feed_mm_s * TICK_S / 2.0,
-        Kind::Fir | Kind::FirZv | Kind::FirZvd => 1e-3,
+        Kind::Fir | Kind::FirZv | Kind::FirZvd | Kind::SCurve => 1e-3,
     }
 }
 

@@ -125,6 +125,7 @@ impl Prefilter {
             Kind::Fir => &[fir],
             Kind::FirZv => &[zv, fir],
             Kind::FirZvd => &[zv, zv, fir],
+            Kind::SCurve => &[fir, fir],
         };
         Ok(Self {
             stages: stages.iter().copied().collect(),
@@ -140,6 +141,14 @@ impl Prefilter {
     pub fn of_boxes([one_s, other_s]: [f64; 2]) -> Self {
         Self {
             stages: Vec::from_iter([one_s.min(other_s), one_s.max(other_s)].map(Stage::Box)),
+        }
+    }
+
+    /// One box, given by its length in seconds: a moving average.
+    #[must_use]
+    pub fn of_box(length_s: f64) -> Self {
+        Self {
+            stages: Vec::from_iter([Stage::Box(length_s)]),
         }
     }
 

@@ -42,11 +42,13 @@ pub enum Kind {
     /// FIR and ZVD in cascade: the widest band and the smoothest motion.
     #[default]
     FirZvd,
+    /// FIR twice, the S-curve of velocity profile overlap: acceleration without jumps.
+    SCurve,
 }
 
 impl Kind {
-    /// Every prefilter, shortest first.
-    pub const ALL: [Self; 7] = [
+    /// Every prefilter, in the order of their numbers.
+    pub const ALL: [Self; 8] = [
         Self::None,
         Self::Zv,
         Self::Zvd,
@@ -54,6 +56,7 @@ impl Kind {
         Self::Fir,
         Self::FirZv,
         Self::FirZvd,
+        Self::SCurve,
     ];
 
     /// The name by which programs and settings call it.
@@ -67,6 +70,7 @@ impl Kind {
             Self::Fir => "fir",
             Self::FirZv => "fir-zv",
             Self::FirZvd => "fir-zvd",
+            Self::SCurve => "s-curve",
         }
     }
 

@@ -147,7 +147,7 @@ const PREFILTERS: &[&str] = &{
 };
 
 /// The table, by number.
-pub const SETTINGS: [Setting; 39] = [
+pub const SETTINGS: [Setting; 40] = [
     setting(
         5,
         "inputs-inverted",
@@ -413,6 +413,14 @@ pub const SETTINGS: [Setting; 39] = [
         "Damping ratio",
         "",
         decimal(0.0, 0.5),
+    ),
+    setting(
+        1049,
+        "overlap",
+        MOTION,
+        "Corner overlap instead of tolerance",
+        "%",
+        decimal(0.0, 100.0),
     ),
     setting(
         1050,
@@ -725,6 +733,7 @@ mod tests {
             // What must fit something else has its range for the help only.
             let is_plain = [
                 "tolerance",
+                "overlap",
                 "rapid",
                 "feed-limit",
                 "yaw-limit",
