@@ -31,6 +31,7 @@ pub mod software_loop;
 pub mod summary;
 pub mod switched_arm;
 mod toml_place;
+pub mod tool_path;
 pub mod trace;
 pub mod vector;
 pub mod vibration;

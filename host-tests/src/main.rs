@@ -5,8 +5,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use host_tests::commands::{
-    Failure, compare, corner, demo, emulate, forward, inverse, methods, monitor, prefilter,
-    profile, run, send,
+    Failure, compare, corner, demo, emulate, forward, inverse, methods, monitor, overlap,
+    prefilter, profile, run, send,
 };
 
 /// Motion control that leaves the robot still: plans, runs and measures path programs.
@@ -36,6 +36,8 @@ enum Command {
     Methods(methods::MethodsArgs),
     /// Solves one corner: how much two segments may overlap within a tolerance.
     Corner(corner::CornerArgs),
+    /// Times a path of a tool that moves and turns, by velocity profile overlap.
+    Overlap(overlap::OverlapArgs),
     /// Shows how long a prefilter is and how much vibration it leaves.
     Prefilter(prefilter::PrefilterArgs),
     /// Plans one move whose mode changes along its way, and simulates what the mode does.
@@ -56,6 +58,7 @@ fn main() -> ExitCode {
         Some(Command::Compare(args)) => compare::execute(&args),
         Some(Command::Methods(args)) => methods::execute(&args),
         Some(Command::Corner(args)) => corner::execute(&args),
+        Some(Command::Overlap(args)) => overlap::execute(&args),
         Some(Command::Prefilter(args)) => prefilter::execute(&args),
         Some(Command::Profile(args)) => profile::execute(&args),
         Some(Command::Inverse(args)) => inverse::execute(&args),

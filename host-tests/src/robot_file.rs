@@ -161,6 +161,7 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
         },
         ConfigError::Range { name, .. } => match *name {
             "tolerance" => vec!["motion.corner_tolerance_mm"],
+            "overlap" => vec!["motion.corner_overlap_percent"],
             "rapid" => vec!["motion.rapid_mm_s"],
             "feed-limit" => vec!["motion.feed_limit_mm_s"],
             "joint-speed" => vec!["motion.joint_speed_deg_s"],
@@ -250,6 +251,7 @@ struct ImpulseTable {
 #[serde(default, deny_unknown_fields)]
 struct MotionTable {
     corner_tolerance_mm: Option<f32>,
+    corner_overlap_percent: Option<f32>,
     rapid_mm_s: Option<f32>,
     feed_limit_mm_s: Option<f32>,
     yaw_limit_deg_s: Option<f32>,
@@ -328,6 +330,10 @@ impl Tables {
         self.prefilter.apply(&mut robot.prefilter);
         let motion = &self.motion;
         set(&mut robot.corner_tolerance_mm, motion.corner_tolerance_mm);
+        set(
+            &mut robot.corner_overlap_percent,
+            motion.corner_overlap_percent,
+        );
         set(&mut robot.rapid_mm_s, motion.rapid_mm_s);
         set(&mut robot.feed_limit_mm_s, motion.feed_limit_mm_s);
         set(&mut robot.yaw_limit_deg_s, motion.yaw_limit_deg_s);

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result};
 use planner_core::config::Robot;
+use planner_core::corner::CornerRule;
 use planner_core::prefilter::Kind;
 
 use crate::checker::{
@@ -114,7 +115,10 @@ impl Scenario {
         let fastest_mm_s = config.feed_limit_mm_s.max(config.rapid_mm_s);
         CheckOptions {
             rapid_mm_s: config.rapid_mm_s.into(),
-            tolerance_mm: config.corner_tolerance_mm.into(),
+            tolerance_mm: match config.corner() {
+                CornerRule::ToleranceMm(mm) => mm.into(),
+                CornerRule::OverlapPercent(_) => f64::INFINITY,
+            },
             feed_window_mm: f64::from(fastest_mm_s) * robot.prefilter.length_s(),
         }
     }

@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use crate::corner::CornerRule;
 use crate::kinematics::{Arm, ArmKind, Elbow, JointRange, Scara, ScaraConfig, ScaraError};
 use crate::pose::AXES;
 use crate::posture::{FollowConfig, FollowError, Follower, ModeMapConfig, PostureMethod, Tuning};
@@ -22,6 +23,9 @@ pub struct RobotConfig {
     pub posture_method: PostureMethod,
     /// Corner tolerance in mm where the program gives none, 0 to 100; 0 stops at corners.
     pub corner_tolerance_mm: f32,
+    /// Corner overlap in percent where the program gives no tolerance, above 0 to 100: instead of
+    /// the tolerance, which is not promised then. 0 rounds corners by their tolerance.
+    pub corner_overlap_percent: f32,
     /// Feedrate of `G0` in mm/s, above 0 to 10 000.
     pub rapid_mm_s: f32,
     /// Fastest feedrate in mm/s, above 0 to 10 000; a program that asks for more gets this.
@@ -41,6 +45,7 @@ impl Default for RobotConfig {
             map: ModeMapConfig::NONE,
             posture_method: PostureMethod::Local,
             corner_tolerance_mm: 0.5,
+            corner_overlap_percent: 0.0,
             rapid_mm_s: 160.0,
             feed_limit_mm_s: 1000.0,
             yaw_limit_deg_s: 360.0,
@@ -133,6 +138,7 @@ impl Robot {
     pub fn new(config: &RobotConfig) -> Result<Self, ConfigError> {
         let checks = [
             ("tolerance", config.corner_tolerance_mm, 0.0, 100.0),
+            ("overlap", config.corner_overlap_percent, 0.0, 100.0),
             ("rapid", config.rapid_mm_s, 0.001, 10_000.0),
             ("feed-limit", config.feed_limit_mm_s, 0.001, 10_000.0),
             ("yaw-limit", config.yaw_limit_deg_s, 0.001, 10_000.0),
@@ -269,9 +275,19 @@ impl fmt::Display for SettingValue {
 }
 
 impl RobotConfig {
+    /// How corners are passed where the program does not say.
+    #[must_use]
+    pub fn corner(&self) -> CornerRule {
+        if self.corner_overlap_percent > 0.0 {
+            CornerRule::OverlapPercent(self.corner_overlap_percent)
+        } else {
+            CornerRule::ToleranceMm(self.corner_tolerance_mm)
+        }
+    }
+
     /// Names of all settings, in groups whose values must fit each other: lengths in mm, angles
     /// in °, the frequency in Hz, feedrates in mm/s, the yaw limit in °/s.
-    pub const GROUPS: [&'static [&'static str]; 15] = [
+    pub const GROUPS: [&'static [&'static str]; 16] = [
         &["link1", "link2"],
         &["elbow", "joint2-min", "joint2-max", "singularity-margin"],
         &["joint1-min", "joint1-max"],
@@ -297,6 +313,7 @@ impl RobotConfig {
         ],
         &["impulse2-ms", "impulse3-ms", "impulse4-ms", "impulse5-ms"],
         &["tolerance"],
+        &["overlap"],
         &["rapid"],
         &["feed-limit"],
         &["yaw-limit"],
@@ -410,6 +427,7 @@ impl RobotConfig {
             "impulse4-ms" => Slot::Number(&mut impulse4.time_ms),
             "impulse5-ms" => Slot::Number(&mut impulse5.time_ms),
             "tolerance" => Slot::Number(&mut self.corner_tolerance_mm),
+            "overlap" => Slot::Number(&mut self.corner_overlap_percent),
             "rapid" => Slot::Number(&mut self.rapid_mm_s),
             "feed-limit" => Slot::Number(&mut self.feed_limit_mm_s),
             "yaw-limit" => Slot::Number(&mut self.yaw_limit_deg_s),
@@ -487,6 +505,7 @@ mod tests {
     fn a_robot_is_refused_by_the_name_of_its_setting() {
         for (text, name) in [
             ("tolerance=-1", "tolerance"),
+            ("overlap=101", "overlap"),
             ("rapid=0", "rapid"),
             ("feed-limit=NaN", "feed-limit"),
             ("yaw-limit=inf", "yaw-limit"),

@@ -26,6 +26,33 @@ const SAMPLES: usize = 2;
 /// What the samples of the deviation are multiplied with, for what lies between them.
 const SAMPLING: f32 = 1.25;
 
+/// How a corner is to be passed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CornerRule {
+    /// Missed by at most so many mm, and as fast as that allows; 0 is an exact stop.
+    ToleranceMm(f32),
+    /// Overlapped by so many percent, 0 (exact stop) to 100 (no dwell at all), however far
+    /// that misses the corner:
+    ///
+    /// ```text
+    /// OVLP = 100 (t_c / T_d1)²                                                   [Li23]
+    /// ```
+    OverlapPercent(f32),
+}
+
+impl CornerRule {
+    /// Stands still at the corner.
+    pub const EXACT_STOP: Self = Self::ToleranceMm(0.0);
+
+    /// Whether it is an exact stop.
+    #[must_use]
+    pub fn stops(self) -> bool {
+        match self {
+            Self::ToleranceMm(amount) | Self::OverlapPercent(amount) => amount <= 0.0,
+        }
+    }
+}
+
 /// A segment as one of its ends sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Side {

@@ -13,6 +13,8 @@ pub mod joint_space;
 pub mod kinematics;
 pub mod math;
 pub mod motion;
+pub mod orientation;
+pub mod overlap;
 pub mod path;
 pub mod planner;
 pub mod pose;

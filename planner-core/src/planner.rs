@@ -411,7 +411,7 @@ impl<'q> Planner<'q> {
             &self.robot,
             &order.path,
             timing,
-            order.corner_tolerance_mm,
+            order.corner,
             order.line,
             next.as_ref().map(|(_, kernel)| kernel),
         );
@@ -425,7 +425,7 @@ impl<'q> Planner<'q> {
     /// to which it is to change on the move's way.
     fn follow(&mut self, order: &Move, timing: &Timing) -> Option<Tuning> {
         let follower = self.robot.follower.as_ref()?;
-        let from_rest = self.schedule.begins_from_rest(order.corner_tolerance_mm);
+        let from_rest = self.schedule.begins_from_rest(order.corner);
         let step = MoveToFollow {
             course: follower.course(&order.path),
             duration_s: timing.duration_s,
@@ -587,7 +587,7 @@ impl<'q> Planner<'q> {
 
 fn defaults(robot: &Robot) -> Defaults {
     Defaults {
-        corner_tolerance_mm: robot.config.corner_tolerance_mm,
+        corner: robot.config.corner(),
         prefilter: robot.config.prefilter,
         elbow: robot.config.scara.elbow,
         first_point_declares: true,

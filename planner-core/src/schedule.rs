@@ -7,7 +7,7 @@
 use heapless::Deque;
 
 use crate::config::Robot;
-use crate::corner::{self, Corner, Side, reach_s};
+use crate::corner::{self, Corner, CornerRule, Side, reach_s};
 use crate::kinematics::Elbow;
 use crate::math::sqrt_f32;
 use crate::path::PathSegment;
@@ -42,6 +42,7 @@ struct Blend {
     reach_s: f32,
     /// The faster of its two segments.
     feed_mm_s: f32,
+    /// Infinite where the overlap is given instead.
     tolerance_mm: f32,
 }
 
@@ -86,7 +87,7 @@ impl<'q> Schedule<'q> {
         self.blends.clear();
     }
 
-    /// Plans a segment that follows the last one, with `tolerance_mm` at the corner between the two.
+    /// Plans a segment that follows the last one, with a rule for the corner between the two.
     ///
     /// The tolerance holds for segments of any length. A corner that is rounded alone misses
     /// by its `e_c`. Where several are being rounded at once, the command is a weighted mean
@@ -100,7 +101,9 @@ impl<'q> Schedule<'q> {
     ///
     /// with `F` the fastest of the segments. A segment begins only when that sum, its own
     /// corner included, is within the smallest tolerance of the corners being rounded, or
-    /// when they are done. Corners at arcs are always rounded alone.
+    /// when they are done. Corners at arcs are always rounded alone. Corners whose overlap is
+    /// given promise nothing: they are rounded as given, any number of them at once, but never
+    /// together with one that has a tolerance.
     ///
     /// On the way of the segment the prefilter may change to another one; what follows has to be
     /// planned with a robot that has it.
@@ -111,7 +114,7 @@ impl<'q> Schedule<'q> {
         robot: &Robot,
         path: &PathSegment,
         timing: &Timing,
-        tolerance_mm: f32,
+        rule: CornerRule,
         line: u32,
         on_the_way: Option<&Kernel>,
     ) -> bool {
@@ -129,7 +132,7 @@ impl<'q> Schedule<'q> {
         }
         let overlap = match self.previous {
             None => 0,
-            Some(arriving) => self.corner(robot, &arriving, &side(first_tangent), tolerance_mm),
+            Some(arriving) => self.corner(robot, &arriving, &side(first_tangent), rule),
         };
         self.previous = Some(side(last_tangent));
         let segment = RawSegment {
@@ -160,9 +163,9 @@ impl<'q> Schedule<'q> {
     }
 
     /// Whether the next segment begins from an exact stop, with that tolerance at its start.
-    pub fn begins_from_rest(&self, tolerance_mm: f32) -> bool {
+    pub fn begins_from_rest(&self, rule: CornerRule) -> bool {
         let turned = self.previous.is_some_and(|side| side.feed_mm_s == 0.0);
-        self.previous.is_none() || tolerance_mm <= 0.0 || turned
+        self.previous.is_none() || rule.stops() || turned
     }
 
     /// Whether the last segment was an arc, which is still in flight when the next one begins.
@@ -245,13 +248,22 @@ impl<'q> Schedule<'q> {
         robot: &Robot,
         arriving: &Side,
         leaving: &Side,
-        tolerance_mm: f32,
+        rule: CornerRule,
     ) -> TickTime {
-        let turns_only = arriving.feed_mm_s == 0.0 || leaving.feed_mm_s == 0.0;
-        let usable_mm = if turns_only { 0.0 } else { tolerance_mm };
-        let corner = solve_sampled(robot, arriving, leaving, usable_mm);
         let settled = robot.kernel.length();
-        let mut dwell = settled - tick_time(f64::from(corner.cornering_s)).min(settled);
+        let (cornering_s, tolerance_mm) = match rule {
+            CornerRule::ToleranceMm(tolerance_mm) => {
+                let turns_only = arriving.feed_mm_s == 0.0 || leaving.feed_mm_s == 0.0;
+                let usable_mm = if turns_only { 0.0 } else { tolerance_mm };
+                let corner = solve_sampled(robot, arriving, leaving, usable_mm);
+                (corner.cornering_s, usable_mm)
+            }
+            CornerRule::OverlapPercent(percent) => {
+                let share = sqrt_f32((percent / 100.0).clamp(0.0, 1.0));
+                (robot.decelerating.length_s() * share, f32::INFINITY)
+            }
+        };
+        let mut dwell = settled - tick_time(f64::from(cornering_s)).min(settled);
         let turn = turn(arriving, leaving);
         let own = Blend {
             // an arc keeps its filter until that has settled to the last bit
@@ -261,12 +273,12 @@ impl<'q> Schedule<'q> {
                 robot.kernel.settling_time()
             },
             turn,
-            reach_s: reach_s(&robot.decelerating, &robot.accelerating, corner.cornering_s),
+            reach_s: reach_s(&robot.decelerating, &robot.accelerating, cornering_s),
             feed_mm_s: arriving.feed_mm_s.max(leaving.feed_mm_s),
-            tolerance_mm: usable_mm,
+            tolerance_mm,
         };
         while let Some(oldest) = self.blends.front().copied() {
-            if oldest.ends > dwell && self.within_tolerance(&own) && !self.blends.is_full() {
+            if oldest.ends > dwell && self.may_join(&own) && !self.blends.is_full() {
                 break;
             }
             dwell = dwell.max(oldest.ends);
@@ -279,13 +291,21 @@ impl<'q> Schedule<'q> {
         (settled - dwell).max(0)
     }
 
-    /// Whether a further corner and those being rounded keep the smallest tolerance.
-    fn within_tolerance(&self, own: &Blend) -> bool {
-        let all = self.blends.iter().chain(core::iter::once(own));
+    /// Whether a further corner may be rounded together with those that are: between lines only,
+    /// and where all overlaps are given, or all together keep the smallest tolerance.
+    fn may_join(&self, own: &Blend) -> bool {
+        let all = || self.blends.iter().chain(core::iter::once(own));
+        if all().any(|blend| blend.turn.is_infinite()) {
+            return false;
+        }
+        let given = |blend: &Blend| blend.tolerance_mm.is_infinite();
+        if all().any(given) {
+            return all().all(given);
+        }
         let mut bend_s = 0.0;
         let mut feed_mm_s = 0.0_f32;
         let mut limit_mm = f32::INFINITY;
-        for blend in all {
+        for blend in all() {
             bend_s += blend.turn * blend.reach_s;
             feed_mm_s = feed_mm_s.max(blend.feed_mm_s);
             limit_mm = limit_mm.min(blend.tolerance_mm);

@@ -4,6 +4,7 @@ mod support;
 
 use std::collections::BTreeSet;
 
+use planner_core::corner::CornerRule;
 use planner_core::gcode::{
     BLOW_OFF, Command, Coolant, Defaults, Distance, Feed, FeedMode, GRIPPER, Interpreter, Line,
     Motion, Move, Plane, ProgramFlow, RobotChange, Spindle, Units,
@@ -183,13 +184,17 @@ fn every_wrong_line_has_its_code() {
         (&[], "G2 X1 Y1 R1 F1", 62),
         (RAPID, "G0 X1*0", 63),
         (RAPID, "G4 P1 G64", 65),
+        (RAPID, "G64 P1 Q50", 80),
+        (RAPID, "G64 Q100.1", 80),
+        (RAPID, "G64 Q-1", 80),
+        (RAPID, "G61 Q50", 20),
         (RAPID, "G10 L2 P1 X1 G64", 65),
         (RAPID, "M101 G0 X1", 65),
         (RAPID, "M100 P1 M3", 65),
         (RAPID, "M102 M30", 65),
         (ARC, "G18 G2 X1 I1", 75),
         (ARC, "G19 G3 Y1 R1", 75),
-        (RAPID, "M100 P7", 76),
+        (RAPID, "M100 P99", 76),
         (RAPID, "M100 P1000", 76),
     ] {
         let mut interpreter = after(before);
@@ -255,7 +260,7 @@ fn lines_without_motion_change_the_modal_state_only() {
     assert_eq!(modal.units(), Units::Inches);
     assert_eq!(modal.distance(), Distance::Incremental);
     assert_eq!(modal.feed_mm_per_min(), Some(25.4));
-    assert_eq!(modal.corner_tolerance_mm(), 0.0);
+    assert_eq!(modal.corner(), CornerRule::EXACT_STOP);
     assert_eq!(modal.position(), None);
     assert_eq!(modal.lines(), 1);
 }
@@ -300,7 +305,7 @@ fn moves_carry_what_the_planner_needs() {
                 shape: Shape::Line,
             },
             feed: Feed::MmPerS(160.0),
-            corner_tolerance_mm: 0.25,
+            corner: CornerRule::ToleranceMm(0.25),
             line: 2,
         }
     );
@@ -330,19 +335,25 @@ fn moves_carry_what_the_planner_needs() {
 }
 
 #[test]
-fn the_corner_tolerance_is_that_of_the_moves_start() {
+fn the_corner_rule_is_that_of_the_moves_start() {
+    use CornerRule::{OverlapPercent, ToleranceMm};
     let mut interpreter = after(&["G0 X0 Y0"]);
     for (text, expected) in [
-        ("X1", 0.25),
-        ("G61 X2", 0.0),
-        ("X3", 0.0),
-        ("G64 P0.5 X4", 0.5),
-        ("G20 G64 P1 X5", 25.4),
-        ("G64 X6", 0.25),
-        ("G64 P0 X7", 0.0),
+        ("X1", ToleranceMm(0.25)),
+        ("G61 X2", ToleranceMm(0.0)),
+        ("X3", ToleranceMm(0.0)),
+        ("G64 P0.5 X4", ToleranceMm(0.5)),
+        ("G20 G64 P1 X5", ToleranceMm(25.4)),
+        ("G64 X6", ToleranceMm(0.25)),
+        ("G64 P0 X7", ToleranceMm(0.0)),
+        ("G64 Q90 X8", OverlapPercent(90.0)),
+        ("X9", OverlapPercent(90.0)),
+        ("G64 Q0 X10", OverlapPercent(0.0)),
+        ("G64 Q100 X11", OverlapPercent(100.0)),
+        ("G64 X12", ToleranceMm(0.25)),
     ] {
         let motion = run_move(&mut interpreter, text);
-        assert_eq!(motion.corner_tolerance_mm, expected, "{text}");
+        assert_eq!(motion.corner, expected, "{text}");
     }
 }
 
@@ -367,7 +378,7 @@ fn dwell_pause_and_end() {
     let modal = *interpreter.modal();
     assert_eq!(modal.motion(), Motion::Linear);
     assert_eq!(modal.distance(), Distance::Absolute);
-    assert_eq!(modal.corner_tolerance_mm(), 0.25);
+    assert_eq!(modal.corner(), CornerRule::ToleranceMm(0.25));
     assert_eq!(modal.units(), Units::Inches);
     assert_eq!(modal.feed_mm_per_min(), Some(25.4));
     assert_eq!(modal.position(), Some(pose(10.0, 0.0, 0.0, 0.0)));
@@ -508,6 +519,10 @@ fn the_parser_state_reads_as_grbls() {
             "G80 G59 G19 G21 G90 G94 M4 M8 T0 F1235 S0 G64 P1",
         ),
         (
+            &["G64 Q62.5"],
+            "G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0 G64 Q62.5",
+        ),
+        (
             &["G1 G20 F10 M7", "M30"],
             "G1 G54 G17 G20 G90 G94 M5 M9 T0 F254 S0 G64 P0.25",
         ),
@@ -605,12 +620,13 @@ fn the_robots_words_change_what_they_name() {
     assert_eq!(interpreter.modal().elbow(), Elbow::Left);
     // New settings hold, whatever a program has said before.
     interpreter.set_defaults(Defaults {
-        corner_tolerance_mm: 1.0,
+        corner: CornerRule::OverlapPercent(30.0),
         ..DEFAULTS
     });
     assert_eq!(interpreter.modal().elbow(), Elbow::Right);
     assert_eq!(*interpreter.modal().prefilter(), DEFAULTS.prefilter);
-    assert_eq!(interpreter.modal().corner_tolerance_mm(), 1.0);
+    let corner = interpreter.modal().corner();
+    assert_eq!(corner, CornerRule::OverlapPercent(30.0));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod support;
 
+use planner_core::corner::CornerRule;
 use planner_core::gcode::{Command, Error, Feed, Interpreter, Line};
 use support::{after, pose};
 
@@ -30,7 +31,7 @@ fn jogs_move_and_leave_the_modes_alone() {
         assert_eq!(motion.path.target, target, "{text}");
         assert_eq!(motion.feed, Feed::MmPerS(feed), "{text}");
         assert_eq!(motion.line, if text.contains('N') { 7 } else { 0 });
-        assert_eq!(motion.corner_tolerance_mm, 0.0);
+        assert_eq!(motion.corner, CornerRule::EXACT_STOP);
         assert_eq!(interpreter.modal().position(), Some(target), "{text}");
         interpreter.set_position(before.modal().position());
         assert_eq!(interpreter.modal(), before.modal(), "{text}");

@@ -29,7 +29,8 @@ pub struct Block {
     pub to: [f64; 4],
     /// Feedrate in mm/s; `None` for a rapid.
     pub feed_mm_s: Option<f64>,
-    /// Tolerance of the corner at its start, millimetres; `None` where none is set.
+    /// Tolerance of the corner at its start, millimetres; `None` where none is set, infinite
+    /// where its overlap is.
     pub tolerance_mm: Option<f64>,
     curve: Curve,
 }
@@ -117,7 +118,7 @@ struct Reader {
 }
 
 impl Program {
-    /// Reads G0–G4, G17, G21, G61, G64 P, G90, G91, G94, M2 and M30 with X Y Z C, I J
+    /// Reads G0–G4, G17, G21, G61, G64 P or Q, G90, G91, G94, M2 and M30 with X Y Z C, I J
     /// and F; anything else is refused rather than misjudged.
     ///
     /// The mode at a block is that of the corner at the block's **end**.
@@ -186,13 +187,18 @@ impl Reader {
                 ('G', 3.0) => self.motion = Motion::Counterclockwise,
                 ('G', 4.0) => dwell = true,
                 ('G', 61.0) => self.tolerance_mm = Some(0.0),
-                ('G', 64.0) => self.tolerance_mm = word('P'),
+                ('G', 64.0) => {
+                    self.tolerance_mm = match word('Q') {
+                        Some(overlap) if overlap > 0.0 => Some(f64::INFINITY),
+                        overlap => word('P').or(overlap),
+                    };
+                }
                 ('G', 90.0) => self.relative = false,
                 ('G', 91.0) => self.relative = true,
                 ('G', 17.0 | 21.0 | 94.0) => {}
                 ('M', 2.0 | 30.0) => end = true,
                 ('F', feed) if feed > 0.0 => self.feed_mm_s = Some(feed / 60.0),
-                ('X' | 'Y' | 'Z' | 'C' | 'I' | 'J' | 'P' | 'N', _) => {}
+                ('X' | 'Y' | 'Z' | 'C' | 'I' | 'J' | 'P' | 'Q' | 'N', _) => {}
                 _ => return Err("a word that this reader does not know"),
             }
         }

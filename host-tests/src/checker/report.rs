@@ -22,7 +22,8 @@ pub struct TraceRow {
 pub struct CheckOptions {
     /// Speed of rapids in mm/s.
     pub rapid_mm_s: f64,
-    /// Corner tolerance where the program sets none, millimetres.
+    /// Corner tolerance where the program sets none, millimetres; infinite where the robot's
+    /// corners are passed by overlap.
     pub tolerance_mm: f64,
     /// How far along the path the feedrate of a faster block may still be seen,
     /// millimetres: at least feedrate times prefilter length.
@@ -51,7 +52,7 @@ pub struct CornerCheck {
     /// How far the less extended of its two segments goes away from it. Where that is within
     /// the tolerance, the passage cannot be told from those of the corners beside it.
     pub shorter_side_mm: f64,
-    /// Tolerance in force.
+    /// Tolerance in force; infinite where the overlap is given instead.
     pub tolerance_mm: f64,
     /// Distance of the trace's polyline to the corner as it passes.
     pub error_mm: f64,

@@ -12,6 +12,7 @@ pub mod methods;
 mod model_args;
 pub mod monitor;
 pub mod output;
+pub mod overlap;
 pub mod prefilter;
 pub mod profile;
 pub mod run;

@@ -47,7 +47,7 @@ pub fn draw(run: &PairedRun) -> Result<String> {
         full(COMMAND, 2, "commanded"),
         full(CONTRAST, 2, "tool, simulated"),
     ];
-    if corners.iter().any(|corner| corner.tolerance_mm > 0.0) {
+    if corners.iter().any(has_tolerance) {
         legend.push(limit("corner tolerance"));
     }
     picture(SIZE, |root| {
@@ -78,6 +78,11 @@ fn subtitle(run: &PairedRun) -> String {
     )
 }
 
+/// Whether a corner has a tolerance to draw: no exact stop, and no given overlap.
+fn has_tolerance(corner: &CornerCheck) -> bool {
+    corner.tolerance_mm > 0.0 && corner.tolerance_mm.is_finite()
+}
+
 /// The corners to enlarge, in the order of the path.
 fn enlarged_corners(run: &PairedRun) -> Vec<CornerCheck> {
     let Ok((_, report)) = &run.outcome.checked else {
@@ -85,7 +90,7 @@ fn enlarged_corners(run: &PairedRun) -> Vec<CornerCheck> {
     };
     // misses that differ by less than a hundredth of the tolerance are equal
     let miss = |corner: &CornerCheck| match corner.tolerance_mm {
-        tolerance if tolerance > 0.0 => (100.0 * corner.error_mm / tolerance).round(),
+        _ if has_tolerance(corner) => (100.0 * corner.error_mm / corner.tolerance_mm).round(),
         _ => 0.0,
     };
     let rank = |corner: &CornerCheck| (miss(corner), corner.angle_deg);
@@ -204,7 +209,8 @@ fn enlarged(area: &Area<'_>, path: &Lines, corner: &CornerCheck, number: usize) 
     );
     let area = caption(area, &text)?;
     let reach = match corner.tolerance_mm {
-        tolerance if tolerance > 0.0 => REACH * tolerance,
+        _ if has_tolerance(corner) => REACH * corner.tolerance_mm,
+        tolerance if tolerance > 0.0 => (REACH * corner.error_mm).max(REACH_AT_STOP_MM),
         _ => REACH_AT_STOP_MM,
     };
     let size = plot_size(&area);
@@ -230,7 +236,7 @@ fn enlarged(area: &Area<'_>, path: &Lines, corner: &CornerCheck, number: usize) 
             .map(|part| thin(part, unit));
         lines(&mut chart, parts, colour, width)?;
     }
-    if corner.tolerance_mm > 0.0 {
+    if has_tolerance(corner) {
         let circle: Vec<_> = (0..=180)
             .map(|k| {
                 let (sin, cos) = (f64::from(k) / 180.0 * TAU).sin_cos();

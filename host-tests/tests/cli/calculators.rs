@@ -1,8 +1,8 @@
-//! `corner`, `prefilter`, `profile`, `inverse` and `forward`: keys and values.
+//! `corner`, `prefilter`, `profile`, `overlap`, `inverse` and `forward`: keys and values.
 
 use serde_json::Value;
 
-use super::{json, keys, near, number, refusal};
+use super::{json, keys, near, number, programs, refusal, stillpoint};
 
 #[test]
 fn corner_has_the_keys_and_values_of_the_published_table() {
@@ -238,4 +238,33 @@ fn inverse_and_forward_undo_each_other() {
         let said = refusal(&args);
         assert!(said.contains(sentence), "{said}");
     }
+}
+
+#[test]
+fn overlap_times_a_path_of_a_tool_that_moves_and_turns() {
+    let table = programs().join("polygon.csv").display().to_string();
+    let run = |flags: &[&str]| {
+        let mut args = vec!["overlap", &table, "--box", "0.125", "--json"];
+        args.extend(flags);
+        json(&args)
+    };
+    for (flags, cycle_s) in [
+        (&[][..], 5.456),
+        (&["--exact"], 5.456),
+        (&["--overlap", "100"], 5.123),
+        (&["--overlap", "0"], 6.373),
+        // the raw path and one box
+        (&["--adai"], 4.998),
+    ] {
+        near(&run(flags), "cycle_s", cycle_s, 0.001);
+    }
+    let found = run(&[]);
+    let last = &found["segments"][5];
+    near(last, "rotation_deg", 38.63, 0.01);
+    assert!(last["overlap_s"].is_null());
+    let text = stillpoint(&["overlap", &table, "--box", "0.125"])
+        .output()
+        .unwrap();
+    let text = String::from_utf8(text.stdout).unwrap();
+    assert!(text.contains("cycle time               5.456 s"), "{text}");
 }

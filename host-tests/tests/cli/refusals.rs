@@ -105,6 +105,35 @@ fn bad_settings_each_have_a_sentence() {
     assert!(corner("181", "160", "1").contains("--angle"));
     assert!(corner("90", "0", "1").contains("--feed"));
     assert!(corner("90", "160", "-1").contains("--tolerance"));
+    let polygon = programs().join("polygon.csv").display().to_string();
+    let overlap = |flags: &[&str]| {
+        let mut args = vec!["overlap", polygon.as_str()];
+        args.extend(flags);
+        refusal(&args)
+    };
+    assert!(overlap(&["--box", "0"]).contains("outside 0.001 to 10 s"));
+    assert!(overlap(&["--box", "0.1", "--overlap", "101"]).contains("--overlap"));
+    let points = here.path().join("points.csv");
+    let header = "x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,feed_mm_s,tolerance_mm,overlap_percent\n";
+    for (rows, sentence) in [
+        ("0,0,0,0,0,0,,,\n", "a path needs two points"),
+        (
+            "0,0,0,0,0,0,,,\n0,0,0,0,0,0,5,,\n",
+            "line 3: a segment neither moves nor turns",
+        ),
+        (
+            "0,0,0,0,0,0,,,\n1,0,0,0,0,0,,,\n",
+            "line 3: feed_mm_s is missing",
+        ),
+        (
+            "0,0,0,0,0,0,,,\n1,0,0,0,0,0,5,1,50\n2,0,0,0,0,0,5,,\n",
+            "line 3: tolerance and overlap are both given",
+        ),
+    ] {
+        fs::write(&points, format!("{header}{rows}")).unwrap();
+        let said = refusal(&["overlap", points.to_str().unwrap(), "--box", "0.1"]);
+        assert!(said.contains(sentence), "{said}");
+    }
     stillpoint(&["run", &path, "--prefilter", "zvx"])
         .assert()
         .failure();

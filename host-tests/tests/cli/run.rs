@@ -172,7 +172,9 @@ fn compare_shows_all_prefilters() {
         .collect();
     assert_eq!(
         names,
-        ["none", "zv", "zvd", "ei", "fir", "fir-zv", "fir-zvd"]
+        [
+            "none", "zv", "zvd", "ei", "fir", "fir-zv", "fir-zvd", "s-curve"
+        ]
     );
     for row in rows {
         assert_eq!(row["refused"], Value::Null);

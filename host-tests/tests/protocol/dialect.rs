@@ -176,6 +176,13 @@ const COMMANDS: &[Row] = &[
         &["G61", "ok"],
     ),
     row(
+        "G64 Q",
+        "corner overlap in percent",
+        &["G64 Q90"],
+        "$G",
+        &["G64 Q90", "ok"],
+    ),
+    row(
         "G64",
         "corner tolerance",
         &["G64 P0.1"],
@@ -676,6 +683,7 @@ const REFUSALS: &[Row] = &[
     row("error:76", "", THERE, "M100 P6 Q1", &["error:76"]),
     row("error:77", "", NONE, "$11=-1", &["error:77"]),
     row("error:78", "", NONE, "$frequency=1.5", &["error:78"]),
+    row("error:80", "", NONE, "G64 P1 Q50", &["error:80"]),
 ];
 
 const ALARMS: &[Row] = &[

@@ -79,7 +79,7 @@ pub(super) enum ToolLength {
 pub(super) enum PathControl {
     /// G61: stand still at every corner.
     ExactStop,
-    /// G64: round corners within the tolerance P, or the robot's own.
+    /// G64: round corners within the tolerance P, by the overlap Q, or by the robot's own rule.
     Blend,
 }
 

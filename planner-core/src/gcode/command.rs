@@ -1,5 +1,6 @@
 //! What a line asks the planner to do.
 
+use crate::corner::CornerRule;
 use crate::kinematics::Elbow;
 use crate::path::PathSegment;
 use crate::pose::Pose;
@@ -68,8 +69,8 @@ pub struct Move {
     pub path: PathSegment,
     /// How fast.
     pub feed: Feed,
-    /// Largest miss of the corner at the **start** of this move; 0 is an exact stop.
-    pub corner_tolerance_mm: f32,
+    /// How the corner at the **start** of this move is to be passed.
+    pub corner: CornerRule,
     /// The N word, or the number of the line in its program; 0 for a jog without N.
     pub line: u32,
 }

@@ -134,6 +134,8 @@ pub enum Error {
     ArcPlane,
     /// 76: M100 with a P that names no prefilter.
     NoSuchPrefilter,
+    /// 80: G64 with both P and Q, or with a Q that is not a percentage.
+    CornerOverlap,
 }
 
 impl Error {
@@ -177,6 +179,7 @@ impl Error {
             Self::OwnLine => 65,
             Self::ArcPlane => 75,
             Self::NoSuchPrefilter => 76,
+            Self::CornerOverlap => 80,
         }
     }
 }
@@ -307,6 +310,7 @@ impl fmt::Display for Error {
                 "G64 beside G4 or G10, or M100 to M102 beside others: give each its own line"
             }
             Self::ArcPlane => "an arc must lie in the XY plane: give G17 before it",
+            Self::CornerOverlap => "G64 takes P in mm or Q of 0 to 100 percent: give one of them",
             Self::NoSuchPrefilter => {
                 return write!(
                     f,
@@ -388,6 +392,7 @@ mod tests {
             (Error::OwnLine, 65),
             (Error::ArcPlane, 75),
             (Error::NoSuchPrefilter, 76),
+            (Error::CornerOverlap, 80),
         ];
         for (error, code) in errors {
             assert_eq!(error.code(), code, "{error:?}");

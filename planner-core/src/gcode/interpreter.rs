@@ -1,5 +1,6 @@
 //! Lines into commands, by the modal state.
 
+use crate::corner::CornerRule;
 use crate::kinematics::Elbow;
 use crate::pose::Pose;
 
@@ -12,6 +13,7 @@ use super::modal::{
     Coolant, Defaults, Distance, FeedMode, Feedrate, Modal, Motion, Plane, Spindle,
 };
 use super::motion::{Frame, Travel, go, linear_to, take_axis_words, travel};
+use super::number::Decimal;
 use super::offset_words::offset_change;
 use super::offsets::{OffsetChange, Offsets};
 use super::parser_state::ParserState;
@@ -20,6 +22,9 @@ use super::robot_words::robot_command;
 
 /// Largest line number, Grbl's.
 pub(super) const MAX_LINE_NUMBER: u32 = 10_000_000;
+
+/// A whole overlap.
+const PERCENT: Decimal = Decimal::from_integer(100);
 
 /// Executes lines: the G-code of Grbl 1.1 but for probing, and the robot's own words.
 ///
@@ -140,7 +145,7 @@ impl Interpreter {
     /// Changes the robot's settings: tolerance, prefilter and elbow are theirs again.
     pub const fn set_defaults(&mut self, defaults: Defaults) {
         self.defaults = defaults;
-        self.modal.corner_tolerance_mm = defaults.corner_tolerance_mm;
+        self.modal.corner = defaults.corner;
         self.modal.prefilter = defaults.prefilter;
         self.modal.elbow = defaults.elbow;
     }
@@ -272,7 +277,7 @@ impl Interpreter {
         }
     }
 
-    /// F, S, T and the P of G64.
+    /// F, S, T, and P and Q of G64.
     fn take_plain_values(&self, block: &mut Block) -> Result<(), Error> {
         let mode = block.modal.feed_mode;
         block.modal.feedrate = match block.take(b'F') {
@@ -289,19 +294,11 @@ impl Interpreter {
         if let Some(tool) = block.take(b'T') {
             block.modal.tool = u8::try_from(tool.integer()).map_err(|_| Error::ToolNumber)?;
         }
-        let own = self.defaults.corner_tolerance_mm;
         match block.path_control {
             None => {}
-            Some(PathControl::ExactStop) => block.modal.corner_tolerance_mm = 0.0,
+            Some(PathControl::ExactStop) => block.modal.corner = CornerRule::EXACT_STOP,
             Some(PathControl::Blend) => {
-                let needs_p = [NonModal::Dwell, NonModal::SetWorkSystem].map(Some);
-                if needs_p.contains(&block.non_modal) {
-                    return Err(Error::OwnLine);
-                }
-                block.modal.corner_tolerance_mm = match block.take(b'P') {
-                    None => own,
-                    Some(tolerance) => block.modal.units.to_mm(b'P', tolerance)?.to_f32(),
-                };
+                block.modal.corner = take_corner(block)?.unwrap_or(self.defaults.corner);
             }
         }
         Ok(())
@@ -349,7 +346,7 @@ impl Interpreter {
         Ok(())
     }
 
-    /// Back to G1, G17, G54, G90, G94, M5, M9 and the robot's corner tolerance, and to line
+    /// Back to G1, G17, G54, G90, G94, M5, M9 and the robot's own corner rule, and to line
     /// 1; as in Grbl, units, feedrate and position stay.
     fn end_program(&self, modal: &mut Modal) {
         modal.motion = Motion::Linear;
@@ -358,13 +355,33 @@ impl Interpreter {
         modal.work_system = 0;
         modal.spindle = Spindle::Off;
         modal.coolant = Coolant::default();
-        modal.corner_tolerance_mm = self.defaults.corner_tolerance_mm;
+        modal.corner = self.defaults.corner;
         modal.lines = 0;
         if modal.feed_mode == FeedMode::InverseTime {
             modal.feed_mode = FeedMode::PerMinute;
             // Its number means something else in G94.
             modal.feedrate = None;
         }
+    }
+}
+
+/// The rule that G64 gives with P, a tolerance, or Q, an overlap in percent.
+fn take_corner(block: &mut Block) -> Result<Option<CornerRule>, Error> {
+    let needs_p = [NonModal::Dwell, NonModal::SetWorkSystem].map(Some);
+    if needs_p.contains(&block.non_modal) {
+        return Err(Error::OwnLine);
+    }
+    let units = block.modal.units;
+    match (block.take(b'P'), block.take(b'Q')) {
+        (None, None) => Ok(None),
+        (Some(tolerance), None) => {
+            let mm = units.to_mm(b'P', tolerance)?.to_f32();
+            Ok(Some(CornerRule::ToleranceMm(mm)))
+        }
+        (None, Some(percent)) if percent >= Decimal::ZERO && percent <= PERCENT => {
+            Ok(Some(CornerRule::OverlapPercent(percent.to_f32())))
+        }
+        (_, Some(_)) => Err(Error::CornerOverlap),
     }
 }
 

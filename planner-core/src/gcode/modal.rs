@@ -1,5 +1,6 @@
 //! What one line leaves behind for the next.
 
+use crate::corner::CornerRule;
 use crate::kinematics::Elbow;
 use crate::pose::Pose;
 use crate::prefilter::PrefilterConfig;
@@ -12,8 +13,8 @@ use super::position::Position;
 /// Settings of the robot that a program starts from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Defaults {
-    /// Corner tolerance until G61 or G64 P, and after G64 without P.
-    pub corner_tolerance_mm: f32,
+    /// How corners are passed until G61 or G64, and after G64 without P or Q.
+    pub corner: CornerRule,
     /// The prefilter until M100.
     pub prefilter: PrefilterConfig,
     /// The elbow's side until M101 or M102.
@@ -27,7 +28,7 @@ impl Default for Defaults {
     /// Exact stops, the default prefilter and elbow; the first point declares.
     fn default() -> Self {
         Self {
-            corner_tolerance_mm: 0.0,
+            corner: CornerRule::EXACT_STOP,
             prefilter: PrefilterConfig::default(),
             elbow: Elbow::default(),
             first_point_declares: true,
@@ -192,7 +193,7 @@ pub struct Modal {
     pub(super) spindle_speed: Decimal,
     /// None until an F that holds.
     pub(super) feedrate: Option<Feedrate>,
-    pub(super) corner_tolerance_mm: f32,
+    pub(super) corner: CornerRule,
     pub(super) prefilter: PrefilterConfig,
     pub(super) elbow: Elbow,
     /// In machine coordinates. None until the first point of a program, or homing, says
@@ -220,7 +221,7 @@ impl Modal {
             tool: 0,
             spindle_speed: Decimal::ZERO,
             feedrate: None,
-            corner_tolerance_mm: defaults.corner_tolerance_mm,
+            corner: defaults.corner,
             prefilter: defaults.prefilter,
             elbow: defaults.elbow,
             position: None,
@@ -297,10 +298,10 @@ impl Modal {
         self.feedrate.map(|feedrate| feedrate.number().to_f32())
     }
 
-    /// Corner tolerance (G61, G64); 0 is an exact stop at every corner.
+    /// How corners are passed (G61, G64).
     #[must_use]
-    pub const fn corner_tolerance_mm(&self) -> f32 {
-        self.corner_tolerance_mm
+    pub const fn corner(&self) -> CornerRule {
+        self.corner
     }
 
     /// The prefilter (M100).

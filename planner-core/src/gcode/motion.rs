@@ -183,7 +183,7 @@ fn moving(modal: &Modal, path: PathSegment, feed: Feed, line: u32) -> Option<Mov
     Some(Move {
         path,
         feed,
-        corner_tolerance_mm: modal.corner_tolerance_mm,
+        corner: modal.corner,
         line,
     })
 }

@@ -2,10 +2,12 @@
 
 use core::fmt;
 
+use crate::corner::CornerRule;
+
 use super::modal::{Distance, FeedMode, Modal, Motion, Plane, Spindle, Units};
 
 /// What stands between `[GC:` and `]`: Grbl's words in Grbl's order, then G61 or G64 with
-/// its tolerance in mm. F is in mm/min, or in G93 in 1/min.
+/// its tolerance in mm or its overlap in percent. F is in mm/min, or in G93 in 1/min.
 #[derive(Clone, Copy, Debug)]
 pub struct ParserState<'m>(pub(super) &'m Modal);
 
@@ -54,10 +56,10 @@ impl fmt::Display for ParserState<'_> {
         let feed = modal.feedrate.map_or(0, |rate| rate.number().rounded());
         let speed = modal.spindle_speed.rounded();
         write!(f, " T{} F{feed} S{speed}", modal.tool)?;
-        if modal.corner_tolerance_mm > 0.0 {
-            write!(f, " G64 P{}", modal.corner_tolerance_mm)
-        } else {
-            f.write_str(" G61")
+        match modal.corner {
+            CornerRule::ToleranceMm(mm) if mm > 0.0 => write!(f, " G64 P{mm}"),
+            CornerRule::OverlapPercent(percent) if percent > 0.0 => write!(f, " G64 Q{percent}"),
+            _ => f.write_str(" G61"),
         }
     }
 }

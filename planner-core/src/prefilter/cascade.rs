@@ -197,6 +197,14 @@ impl Prefilter {
         }
     }
 
+    /// One box, given by its length in seconds: a moving average.
+    #[must_use]
+    pub fn of_box(length_s: f64) -> Self {
+        Self {
+            stages: Vec::from_iter([Stage::Box(length_s)]),
+        }
+    }
+
     /// The stages in the order in which they filter.
     #[must_use]
     pub fn stages(&self) -> &[Stage] {

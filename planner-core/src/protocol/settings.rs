@@ -147,7 +147,7 @@ const PREFILTERS: &[&str] = &{
 };
 
 /// The table, by number.
-pub const SETTINGS: [Setting; 57] = [
+pub const SETTINGS: [Setting; 58] = [
     setting(
         5,
         "inputs-inverted",
@@ -461,6 +461,14 @@ pub const SETTINGS: [Setting; 57] = [
         "Second box of a prefilter without, 0 none",
         "ms",
         decimal(0.0, 500.0),
+    ),
+    setting(
+        1049,
+        "overlap",
+        MOTION,
+        "Corner overlap instead of tolerance",
+        "%",
+        decimal(0.0, 100.0),
     ),
     setting(
         1050,
@@ -869,6 +877,7 @@ mod tests {
             // What must fit something else has its range for the help only.
             let is_plain = [
                 "tolerance",
+                "overlap",
                 "rapid",
                 "feed-limit",
                 "yaw-limit",

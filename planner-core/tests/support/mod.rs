@@ -3,6 +3,7 @@
 // Each test file uses its part.
 #![allow(dead_code)]
 
+use planner_core::corner::CornerRule;
 use planner_core::gcode::{Command, Defaults, Error, Interpreter, Line, Move};
 use planner_core::kinematics::Elbow;
 use planner_core::pose::Pose;
@@ -11,7 +12,7 @@ use planner_core::units::LengthMm;
 
 /// Settings that differ from those of [`Defaults::default`].
 pub const DEFAULTS: Defaults = Defaults {
-    corner_tolerance_mm: 0.25,
+    corner: CornerRule::ToleranceMm(0.25),
     prefilter: PrefilterConfig {
         kind: Kind::FirZvd,
         frequency_hz: 6.34,
