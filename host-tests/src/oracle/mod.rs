@@ -9,6 +9,7 @@ pub mod corner;
 pub mod path;
 pub mod posture;
 pub mod prefilter;
+pub mod servo;
 
 pub use corner::{Corner, CornerSolution, Leg};
 pub use path::{Geometry, Path, Schedule, Segment};
