@@ -56,6 +56,8 @@ check("it knows where it is", streamer.cmode == "Idle", streamer.cmode)
 lines = program(20)
 run(lines)
 finished = wait_for(lambda: "on_job_completed" in events, 60)
+# It may say that the job is complete before it says so of the last line.
+wait_for(lambda: events.count("on_processed_command") >= 1000, 5)
 processed = events.count("on_processed_command")
 check("stream 1000 lines", finished and processed == 1000 and not errors, (processed, errors))
 check_view("after the program", *stands(), expected=[250.08, 0, 0])

@@ -2,11 +2,21 @@
 
 use std::fmt;
 
+use planner_core::servo::ServoConfig;
+
 use crate::plant::config::JOINTS;
 use crate::plant::{FullConfig, Mode, ModeMap, ScaraArm};
 
 /// Lowest frequency that a posture-dependent mode falls to.
 const MODE_MIN_HZ: f64 = 0.1;
+
+/// The servos' tables in a robot file.
+const SERVOS: [&str; JOINTS] = [
+    "servo.joint1",
+    "servo.joint2",
+    "servo.joint3",
+    "servo.joint4",
+];
 
 /// Settings of the simulated robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +39,8 @@ pub struct PlantConfig {
     pub encoder_noise_mm: f64,
     /// Seed of the noise.
     pub noise_seed: u64,
+    /// The servos of the joints.
+    pub servos: [ServoConfig; JOINTS],
 }
 
 impl Default for PlantConfig {
@@ -43,6 +55,7 @@ impl Default for PlantConfig {
             encoder_noise_rad: 1e-6,
             encoder_noise_mm: 1e-4,
             noise_seed: 0,
+            servos: FullConfig::default().joints.map(|joint| joint.servo),
         }
     }
 }
@@ -108,15 +121,23 @@ impl PlantConfig {
         let wrong = ranges
             .into_iter()
             .find(|(_, value, low, high)| !(low..=high).contains(&value));
-        match wrong {
-            None => Ok(()),
-            Some((key, value, low, high)) => Err(PlantConfigError {
+        if let Some((key, value, low, high)) = wrong {
+            return Err(PlantConfigError {
                 key,
                 value,
                 low,
                 high,
-            }),
+            });
         }
+        for (key, servo) in SERVOS.into_iter().zip(&self.servos) {
+            servo.validate().map_err(|error| PlantConfigError {
+                key,
+                value: error.value.into(),
+                low: error.low.into(),
+                high: error.high.into(),
+            })?;
+        }
+        Ok(())
     }
 
     /// The full plant at rest with its joints at `start` (rad, rad, mm, rad).
@@ -135,8 +156,9 @@ impl PlantConfig {
         };
         let noise = self.encoder_noise_rad;
         let noise = [noise, noise, self.encoder_noise_mm / 1e3, noise];
-        for (joint, noise) in config.joints.iter_mut().zip(noise) {
+        for ((joint, noise), servo) in config.joints.iter_mut().zip(noise).zip(self.servos) {
             joint.encoder_noise = noise;
+            joint.servo = servo;
         }
         config
     }

@@ -10,6 +10,7 @@ use planner_core::config::{ConfigError, Robot, RobotConfig};
 use planner_core::kinematics::{Elbow, JointRange, ScaraError};
 use planner_core::posture::{FollowError, MapError};
 use planner_core::prefilter::{CustomImpulse, Kind, MAX_IMPULSES, PrefilterConfig, PrefilterError};
+use planner_core::servo::ServoConfig;
 use serde::{Deserialize, Deserializer};
 
 use crate::plant::Mode;
@@ -177,6 +178,7 @@ struct Tables {
     prefilter: PrefilterTable,
     motion: MotionTable,
     plant: PlantTable,
+    servo: ServoTables,
 }
 
 #[derive(Deserialize, Default)]
@@ -271,6 +273,28 @@ struct PlantTable {
     noise_seed: Option<u64>,
 }
 
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct ServoTables {
+    joint1: ServoTable,
+    joint2: ServoTable,
+    joint3: ServoTable,
+    joint4: ServoTable,
+}
+
+/// Inertias are the simulated robot's, and not the file's to change.
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct ServoTable {
+    position_gain_per_s: Option<f32>,
+    velocity_gain: Option<f32>,
+    integral_time_s: Option<f32>,
+    velocity_feed_forward: Option<f32>,
+    acceleration_feed_forward: Option<f32>,
+    torque_limit: Option<f32>,
+    observer_rad_s: Option<f32>,
+}
+
 fn prefilter_name<'de, D: Deserializer<'de>>(text: D) -> Result<Option<Kind>, D::Error> {
     let name = String::deserialize(text)?;
     let known = || Kind::ALL.map(Kind::name).join(", ");
@@ -338,10 +362,13 @@ impl Tables {
         set(&mut robot.feed_limit_mm_s, motion.feed_limit_mm_s);
         set(&mut robot.yaw_limit_deg_s, motion.yaw_limit_deg_s);
         set(&mut robot.joint_speed_deg_s, motion.joint_speed_deg_s);
-        RobotSettings {
-            plant: self.plant.config(&robot),
-            robot,
+        let mut plant = self.plant.config(&robot);
+        let servo = &self.servo;
+        let tables = [&servo.joint1, &servo.joint2, &servo.joint3, &servo.joint4];
+        for (servo, table) in plant.servos.iter_mut().zip(tables) {
+            table.apply(servo);
         }
+        RobotSettings { plant, robot }
     }
 }
 
@@ -384,6 +411,21 @@ impl PlantTable {
         set(&mut plant.encoder_noise_mm, self.encoder_noise_mm);
         set(&mut plant.noise_seed, self.noise_seed);
         plant
+    }
+}
+
+impl ServoTable {
+    fn apply(&self, servo: &mut ServoConfig) {
+        set(&mut servo.position_gain, self.position_gain_per_s);
+        set(&mut servo.velocity_gain, self.velocity_gain);
+        set(&mut servo.integral_time_s, self.integral_time_s);
+        set(&mut servo.velocity_feed_forward, self.velocity_feed_forward);
+        set(
+            &mut servo.acceleration_feed_forward,
+            self.acceleration_feed_forward,
+        );
+        set(&mut servo.torque_limit, self.torque_limit);
+        set(&mut servo.observer_rad_s, self.observer_rad_s);
     }
 }
 

@@ -25,6 +25,7 @@ pub mod queue;
 pub mod rate;
 pub mod raw;
 mod schedule;
+pub mod servo;
 pub mod store;
 pub mod telemetry;
 pub mod units;

@@ -10,6 +10,7 @@ pub mod path;
 pub mod posture;
 pub mod prefilter;
 pub mod rotation;
+pub mod servo;
 
 pub use corner::{Corner, CornerSolution, Leg};
 pub use path::{Geometry, Path, Schedule, Segment};

@@ -3,8 +3,9 @@
 use std::fmt;
 use std::sync::Arc;
 
+use planner_core::servo::{ServoConfig, Travel};
+
 use super::arm::{ArmInertia, ScaraArm};
-use super::drive::{AccelerationSource, DriveConfig};
 use super::mode::Mode;
 
 /// Joints of the robot.
@@ -45,11 +46,11 @@ impl fmt::Debug for ModeMap {
     }
 }
 
-/// One joint with its drive; joint 3 in metres and newtons.
+/// One joint with its servo; joint 3 in metres and newtons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointConfig {
-    /// Its drive.
-    pub drive: DriveConfig,
+    /// Its servo, and with it the inertia of its motor.
+    pub servo: ServoConfig,
     /// Stiffness between motor and link: Nm/rad or N/m.
     pub stiffness: f64,
     /// Damping between motor and link: Nm·s/rad or N·s/m.
@@ -96,10 +97,10 @@ impl Default for FullConfig {
             arm: ScaraArm::default(),
             inertia,
             joints: [
-                joint(0.080, inertia.a, 10_000.0, 150.0),
-                joint(0.030, inertia.d, 3_000.0, 60.0),
-                joint(6.0, 3.0, 1.0e6, 1_500.0),
-                joint(0.002, 0.002, 300.0, 5.0),
+                joint(Travel::Rotary, 0.080, inertia.a, 10_000.0, 150.0),
+                joint(Travel::Rotary, 0.030, inertia.d, 3_000.0, 60.0),
+                joint(Travel::Linear, 6.0, 3.0, 1.0e6, 1_500.0),
+                joint(Travel::Rotary, 0.002, 0.002, 300.0, 5.0),
             ],
             tool_mass_kg: 0.05,
             mode: ModeMap::default(),
@@ -112,24 +113,25 @@ impl Default for FullConfig {
 /// A joint with the drive gains of vNoorden21, scaled to this arm: its flexible
 /// joints and the slower motors bring K_p from 1100 to 200 1/s; K_v gives the bare
 /// motor a bandwidth of 2500 rad/s; the integral time is the thesis's.
-fn joint(motor: f64, link: f64, stiffness: f64, torque_limit: f64) -> JointConfig {
+fn joint(travel: Travel, motor: f64, link: f64, stiffness: f64, torque_limit: f32) -> JointConfig {
     JointConfig {
-        drive: DriveConfig {
-            motor_inertia: motor,
-            feed_forward_inertia: motor + link,
+        servo: ServoConfig {
+            travel,
             position_gain: 200.0,
-            velocity_gain: 2500.0 * motor,
-            integral_time_s: 0.0067,
-            velocity_feed_forward: 1.0,
-            acceleration_feed_forward: 1.0,
-            acceleration_source: AccelerationSource::Interpolated,
+            velocity_gain: 2500.0 * motor as f32,
+            motor_inertia: motor as f32,
+            total_inertia: (motor + link) as f32,
             torque_limit,
+            ..ServoConfig::default()
         },
         stiffness,
         // A damping ratio of 0.05 against a motor that holds still.
         damping: 2.0 * 0.05 * (stiffness * link).sqrt(),
         link_inertia: link,
         // About one count of a 23-bit encoder on the joint.
-        encoder_noise: 1.0e-6 * if motor > 1.0 { 0.1 } else { 1.0 },
+        encoder_noise: match travel {
+            Travel::Rotary => 1e-6,
+            Travel::Linear => 1e-7,
+        },
     }
 }

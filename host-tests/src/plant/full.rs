@@ -3,7 +3,7 @@
 //! | part | model |
 //! |---|---|
 //! | setpoints | one tick of transport, then one tick of cubic interpolation |
-//! | drive | [`Drive`], 8 kHz, encoder on the motor with seeded noise |
+//! | drive | the core's [`Servo`], 8 kHz, encoder on the motor with seeded noise |
 //! | joint | motor inertia, spring and damper, link |
 //! | links | planar two-link dynamics; quill and wrist on their own |
 //! | end effector | [`Mode`] in X and Y, rigid in Z; its mass pulls back at the arm |
@@ -11,18 +11,18 @@
 //! The mechanics run in SI units at 24 kHz (RK4). Gravity is balanced, friction
 //! and the gyroscopic pull of the wrist are left out.
 
+use planner_core::servo::{CYCLE_HZ, CYCLES_PER_TICK, Knot, Servo};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::config::{FullConfig, JOINTS};
-use super::drive::{CYCLE_S, CYCLES_PER_TICK, Drive, Setpoint};
+use super::config::{FullConfig, JOINTS, JointConfig};
 use super::mode::Mode;
 
 /// Mechanical steps per drive cycle.
 const STEPS_PER_CYCLE: u32 = 3;
 
 /// Mechanical step in seconds.
-const STEP_S: f64 = CYCLE_S / STEPS_PER_CYCLE as f64;
+const STEP_S: f64 = 1.0 / (CYCLE_HZ * STEPS_PER_CYCLE) as f64;
 
 /// SI units per unit of a joint: radians, and metres per millimetre.
 const SI: [f64; JOINTS] = [1.0, 1.0, 1e-3, 1.0];
@@ -62,13 +62,17 @@ impl JointSetpoint {
         }
     }
 
-    fn joint(&self, i: usize) -> Setpoint {
-        Setpoint {
-            position: self.position[i] * SI[i],
-            velocity: self.velocity[i] * SI[i],
-            acceleration: self.acceleration[i] * SI[i],
+    fn joint(&self, i: usize, joint: &JointConfig) -> Knot {
+        Knot {
+            position: bits(joint, self.position[i] * SI[i]),
+            velocity: self.velocity[i] as f32,
         }
     }
+}
+
+/// A position in radians or metres as a servo counts it.
+fn bits(joint: &JointConfig, position: f64) -> i32 {
+    (position / f64::from(joint.servo.travel.si_per_lsb())).round() as i32
 }
 
 /// What the plant shows at the end of a tick.
@@ -92,7 +96,7 @@ pub struct PlantOutput {
 #[derive(Clone, Debug)]
 pub struct FullPlant {
     config: FullConfig,
-    drives: [Drive; JOINTS],
+    servos: [Servo; JOINTS],
     pending: JointSetpoint,
     state: State,
     rng: ChaCha8Rng,
@@ -100,14 +104,22 @@ pub struct FullPlant {
 
 impl FullPlant {
     /// At rest at the configuration's start.
+    ///
+    /// # Panics
+    /// If the settings of a servo are out of range:
+    /// [`PlantConfig::check`](crate::plant_config::PlantConfig::check) finds them.
     #[must_use]
     pub fn new(config: FullConfig) -> Self {
         let start: [f64; JOINTS] = std::array::from_fn(|i| config.start[i] * SI[i]);
         let mut state = [0.0; STATES];
         state[MOTOR..LINK].copy_from_slice(&start);
         state[LINK..DEFLECTION].copy_from_slice(&start);
+        let servo = |i: usize| {
+            let joint = &config.joints[i];
+            Servo::new(&joint.servo, bits(joint, start[i])).expect("servos within their ranges")
+        };
         Self {
-            drives: std::array::from_fn(|i| Drive::new(config.joints[i].drive, start[i])),
+            servos: std::array::from_fn(servo),
             pending: JointSetpoint::at_rest(config.start),
             rng: ChaCha8Rng::seed_from_u64(config.seed),
             state,
@@ -118,15 +130,17 @@ impl FullPlant {
     /// One control tick of 1 ms: carries out the setpoint of the last call, takes
     /// up this one, and shows the state at the end of the tick.
     pub fn step(&mut self, setpoint: JointSetpoint) -> PlantOutput {
-        for (i, drive) in self.drives.iter_mut().enumerate() {
-            drive.latch(self.pending.joint(i));
+        for (i, servo) in self.servos.iter_mut().enumerate() {
+            servo.latch(self.pending.joint(i, &self.config.joints[i]));
         }
         self.pending = setpoint;
         for cycle in 0..CYCLES_PER_TICK {
             let mut torque = [0.0; JOINTS];
-            for (i, drive) in self.drives.iter_mut().enumerate() {
-                let noise = self.config.joints[i].encoder_noise * self.rng.random_range(-1.0..=1.0);
-                torque[i] = drive.cycle(cycle, self.state[MOTOR + i] + noise);
+            for (i, servo) in self.servos.iter_mut().enumerate() {
+                let joint = &self.config.joints[i];
+                let noise = joint.encoder_noise * self.rng.random_range(-1.0..=1.0);
+                let encoder = bits(joint, self.state[MOTOR + i] + noise);
+                torque[i] = servo.cycle(cycle, encoder).into();
             }
             let mode = self.mode();
             for _ in 0..STEPS_PER_CYCLE {
@@ -157,7 +171,7 @@ impl FullPlant {
             flange_mm,
             joint_position: std::array::from_fn(|i| s[LINK + i] / SI[i]),
             motor_position: std::array::from_fn(|i| s[MOTOR + i] / SI[i]),
-            saturated: std::array::from_fn(|i| self.drives[i].saturated()),
+            saturated: std::array::from_fn(|i| self.servos[i].is_saturated()),
         }
     }
 
@@ -179,7 +193,7 @@ impl FullPlant {
             .inertia
             .kinetic_j(s[LINK + 1], [rate(LINK), rate(LINK + 1)]);
         for (i, joint) in self.config.joints.iter().enumerate() {
-            energy += 0.5 * joint.drive.motor_inertia * rate(MOTOR + i).powi(2);
+            energy += 0.5 * f64::from(joint.servo.motor_inertia) * rate(MOTOR + i).powi(2);
             energy += 0.5 * joint.stiffness * (s[MOTOR + i] - s[LINK + i]).powi(2);
             if i >= 2 {
                 energy += 0.5 * joint.link_inertia * rate(LINK + i).powi(2);
@@ -223,7 +237,7 @@ impl FullPlant {
         d[..RATES].copy_from_slice(&s[RATES..]);
         let spring: [f64; JOINTS] = std::array::from_fn(|i| self.spring(s, i));
         for (i, joint) in config.joints.iter().enumerate() {
-            d[RATES + MOTOR + i] = (torque[i] - spring[i]) / joint.drive.motor_inertia;
+            d[RATES + MOTOR + i] = (torque[i] - spring[i]) / f64::from(joint.servo.motor_inertia);
             d[RATES + LINK + i] = spring[i] / joint.link_inertia;
         }
         // The swinging mass accelerates by ÿ and pulls back with −m ÿ.

@@ -5,7 +5,6 @@
 
 pub mod arm;
 pub mod config;
-pub mod drive;
 pub mod full;
 pub mod ideal;
 pub mod mode;

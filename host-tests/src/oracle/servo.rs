@@ -1,4 +1,4 @@
-//! The drive of one joint: setpoint interpolation, position P, velocity PI,
+//! The servo of one joint in double precision: setpoint interpolation, position P, velocity PI,
 //! feed-forward and torque limit, at 8 kHz.
 //!
 //! The structure is that of vNoorden21 (model, section 6). Everything is
@@ -13,23 +13,9 @@ pub const TICK_S: f64 = 1e-3;
 /// Drive cycle in seconds.
 pub const CYCLE_S: f64 = TICK_S / CYCLES_PER_TICK as f64;
 
-/// Bandwidth of the velocity observer in rad/s: below it the encoder counts, above
-/// it the integrated torque.
-const OBSERVER_RAD_S: f64 = 1500.0;
-
-/// Where the acceleration feed-forward comes from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum AccelerationSource {
-    /// From the coefficients of the cubic through position and velocity.
-    #[default]
-    Interpolated,
-    /// The setpoint's own acceleration, linearly interpolated.
-    Setpoint,
-}
-
-/// Settings of one drive.
+/// Settings of one servo.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DriveConfig {
+pub struct ServoConfig {
     /// Motor inertia, reflected: kg·m² or kg.
     pub motor_inertia: f64,
     /// Inertia that the acceleration feed-forward reckons with, motor and load.
@@ -44,10 +30,11 @@ pub struct DriveConfig {
     pub velocity_feed_forward: f64,
     /// Share of the acceleration feed-forward, 0 to 1.
     pub acceleration_feed_forward: f64,
-    /// Where the acceleration comes from.
-    pub acceleration_source: AccelerationSource,
     /// Largest torque or force: Nm or N.
     pub torque_limit: f64,
+    /// Bandwidth of the velocity observer in rad/s: below it the encoder counts, above it the
+    /// integrated torque.
+    pub observer_rad_s: f64,
 }
 
 /// Position, velocity and acceleration of one joint: rad or m.
@@ -75,10 +62,10 @@ pub fn interpolate(a: Setpoint, b: Setpoint, t_s: f64) -> Setpoint {
     }
 }
 
-/// Drive of one joint.
+/// Servo of one joint.
 #[derive(Clone, Debug)]
-pub struct Drive {
-    config: DriveConfig,
+pub struct Servo {
+    config: ServoConfig,
     from: Setpoint,
     to: Setpoint,
     integral: f64,
@@ -87,10 +74,10 @@ pub struct Drive {
     observed: [f64; 3],
 }
 
-impl Drive {
+impl Servo {
     /// At rest at `position`.
     #[must_use]
-    pub fn new(config: DriveConfig, position: f64) -> Self {
+    pub fn new(config: ServoConfig, position: f64) -> Self {
         let rest = Setpoint {
             position,
             ..Setpoint::default()
@@ -116,16 +103,8 @@ impl Drive {
         let config = self.config;
         let t = f64::from(cycle) * CYCLE_S;
         let wanted = interpolate(self.from, self.to, t);
-        let acceleration = match config.acceleration_source {
-            // In the middle of the cycle, for which the torque is held.
-            AccelerationSource::Interpolated => {
-                interpolate(self.from, self.to, t + CYCLE_S / 2.0).acceleration
-            }
-            AccelerationSource::Setpoint => {
-                let share = (t + CYCLE_S / 2.0) / TICK_S;
-                self.from.acceleration + share * (self.to.acceleration - self.from.acceleration)
-            }
-        };
+        // In the middle of the cycle, for which the torque is held.
+        let acceleration = interpolate(self.from, self.to, t + CYCLE_S / 2.0).acceleration;
 
         self.correct(encoder);
         let velocity = config.position_gain * (wanted.position - encoder)
@@ -152,7 +131,7 @@ impl Drive {
 
     /// Observer: the encoder corrects all three states, three equal poles.
     fn correct(&mut self, encoder: f64) {
-        let pole = (-OBSERVER_RAD_S * CYCLE_S).exp();
+        let pole = (-self.config.observer_rad_s * CYCLE_S).exp();
         let error = encoder - self.observed[0];
         let gains = [
             1.0 - pole.powi(3),
@@ -180,7 +159,7 @@ impl Drive {
 mod tests {
     use super::*;
 
-    const CONFIG: DriveConfig = DriveConfig {
+    const CONFIG: ServoConfig = ServoConfig {
         motor_inertia: 0.1,
         feed_forward_inertia: 0.1,
         position_gain: 200.0,
@@ -188,19 +167,19 @@ mod tests {
         integral_time_s: 0.0067,
         velocity_feed_forward: 1.0,
         acceleration_feed_forward: 1.0,
-        acceleration_source: AccelerationSource::Interpolated,
         torque_limit: 50.0,
+        observer_rad_s: 1500.0,
     };
 
-    /// A free motor of the drive's inertia; the position error after each tick.
-    fn track(config: DriveConfig, path: impl Fn(f64) -> Setpoint, ticks: u32) -> Vec<f64> {
-        let mut drive = Drive::new(config, path(0.0).position);
+    /// A free motor of the servo's inertia; the position error after each tick.
+    fn track(config: ServoConfig, path: impl Fn(f64) -> Setpoint, ticks: u32) -> Vec<f64> {
+        let mut servo = Servo::new(config, path(0.0).position);
         let (mut position, mut velocity) = (path(0.0).position, 0.0);
         let mut errors = Vec::new();
         for tick in 0..ticks {
-            drive.latch(path(f64::from(tick + 1) * TICK_S));
+            servo.latch(path(f64::from(tick + 1) * TICK_S));
             for cycle in 0..CYCLES_PER_TICK {
-                let acceleration = drive.cycle(cycle, position) / config.motor_inertia;
+                let acceleration = servo.cycle(cycle, position) / config.motor_inertia;
                 position += CYCLE_S * (velocity + CYCLE_S / 2.0 * acceleration);
                 velocity += CYCLE_S * acceleration;
             }
@@ -235,7 +214,7 @@ mod tests {
 
     #[test]
     fn lag_on_a_ramp_is_v_over_kp_without_feed_forward_and_none_with() {
-        let without = DriveConfig {
+        let without = ServoConfig {
             velocity_feed_forward: 0.0,
             ..CONFIG
         };
@@ -256,17 +235,12 @@ mod tests {
             let errors = track(config, sine, 2000);
             errors[1000..].iter().fold(0.0_f64, |m, e| m.max(e.abs()))
         };
-        let off = worst(DriveConfig {
+        let off = worst(ServoConfig {
             acceleration_feed_forward: 0.0,
             ..CONFIG
         });
-        let setpoint = worst(DriveConfig {
-            acceleration_source: AccelerationSource::Setpoint,
-            ..CONFIG
-        });
-        let interpolated = worst(CONFIG);
-        assert!(interpolated < off / 20.0, "{interpolated} {off}");
-        assert!(setpoint < off / 20.0, "{setpoint} {off}");
+        let on = worst(CONFIG);
+        assert!(on < off / 20.0, "{on} {off}");
     }
 
     #[test]

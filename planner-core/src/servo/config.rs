@@ -1,0 +1,152 @@
+//! The settings of a joint's servo.
+
+use core::fmt;
+
+/// Which way a joint moves, and with it the unit of its positions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Travel {
+    /// It turns: positions in 2^-26 rad, torques in Nm.
+    #[default]
+    Rotary,
+    /// It slides: positions in 2^-19 mm, forces in N.
+    Linear,
+}
+
+impl Travel {
+    /// Radians or metres in the last bit of a position.
+    #[must_use]
+    pub const fn si_per_lsb(self) -> f32 {
+        match self {
+            Self::Rotary => 1.0 / (1 << 26) as f32,
+            Self::Linear => 1e-3 / (1 << 19) as f32,
+        }
+    }
+
+    /// Bits of a position in a radian or a millimetre, the units of a setpoint's velocity.
+    #[must_use]
+    pub const fn lsb_per_unit(self) -> f32 {
+        match self {
+            Self::Rotary => (1 << 26) as f32,
+            Self::Linear => (1 << 19) as f32,
+        }
+    }
+}
+
+/// Settings of a servo, reflected to the joint side of the gear: radians and Nm, or metres
+/// and N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoConfig {
+    /// Which way the joint moves.
+    pub travel: Travel,
+    /// `K_p` of the position loop in 1/s, above 0 to 5000.
+    pub position_gain: f32,
+    /// `K_v` of the velocity loop in Nm·s/rad or N·s/m, above 0 to 1e6.
+    pub velocity_gain: f32,
+    /// Integral time of the velocity loop in seconds, 0.0005 to 10.
+    pub integral_time_s: f32,
+    /// Part of the velocity that is fed forward, 0 to 1.
+    pub velocity_feed_forward: f32,
+    /// Part of the acceleration that is fed forward, 0 to 1.
+    pub acceleration_feed_forward: f32,
+    /// Inertia of the motor, which the observer reckons with: kg·m² or kg, above 0 to 1e4.
+    pub motor_inertia: f32,
+    /// Inertia of motor and load, which the acceleration's feed-forward reckons with, above 0
+    /// to 1e4.
+    pub total_inertia: f32,
+    /// Largest torque or force: Nm or N, 0 to 1e6.
+    pub torque_limit: f32,
+    /// Bandwidth of the velocity observer in rad/s, 1 to 10 000: below it the encoder counts,
+    /// above it the acceleration that the torque implies, so that encoder noise stays out.
+    pub observer_rad_s: f32,
+}
+
+impl Default for ServoConfig {
+    /// The gains of vNoorden21.
+    fn default() -> Self {
+        Self {
+            travel: Travel::Rotary,
+            position_gain: 1100.0,
+            velocity_gain: 0.25,
+            integral_time_s: 0.0067,
+            velocity_feed_forward: 1.0,
+            acceleration_feed_forward: 1.0,
+            motor_inertia: 1e-4,
+            total_inertia: 1e-4,
+            torque_limit: 23.3,
+            observer_rad_s: 1500.0,
+        }
+    }
+}
+
+/// Why a servo's settings are refused; names the setting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoError {
+    /// The setting.
+    pub name: &'static str,
+    /// What was given.
+    pub value: f32,
+    /// Lowest value.
+    pub low: f32,
+    /// Highest value.
+    pub high: f32,
+}
+
+impl fmt::Display for ServoError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            name,
+            value,
+            low,
+            high,
+        } = self;
+        write!(
+            f,
+            "the servo's {name} of {value} is outside {low} to {high}: give a value within that range"
+        )
+    }
+}
+
+impl core::error::Error for ServoError {}
+
+impl ServoConfig {
+    /// Whether a servo can be made of these.
+    ///
+    /// # Errors
+    /// [`ServoError`] names the first setting that is out of range.
+    pub fn validate(&self) -> Result<(), ServoError> {
+        let ranges = [
+            ("position_gain", self.position_gain, 1e-3, 5e3),
+            ("velocity_gain", self.velocity_gain, 1e-6, 1e6),
+            ("integral_time_s", self.integral_time_s, 5e-4, 10.0),
+            (
+                "velocity_feed_forward",
+                self.velocity_feed_forward,
+                0.0,
+                1.0,
+            ),
+            (
+                "acceleration_feed_forward",
+                self.acceleration_feed_forward,
+                0.0,
+                1.0,
+            ),
+            ("motor_inertia", self.motor_inertia, 1e-9, 1e4),
+            ("total_inertia", self.total_inertia, 1e-9, 1e4),
+            ("torque_limit", self.torque_limit, 0.0, 1e6),
+            ("observer_rad_s", self.observer_rad_s, 1.0, 1e4),
+        ];
+        // Written so that NaN is out of range.
+        let wrong = ranges
+            .into_iter()
+            .find(|(_, value, low, high)| !(low..=high).contains(&value));
+        match wrong {
+            None => Ok(()),
+            Some((name, value, low, high)) => Err(ServoError {
+                name,
+                value,
+                low,
+                high,
+            }),
+        }
+    }
+}
