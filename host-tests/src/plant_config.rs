@@ -4,8 +4,9 @@ use std::fmt;
 
 use planner_core::servo::ServoConfig;
 
+use crate::plant::arm::ArmInertia;
 use crate::plant::config::JOINTS;
-use crate::plant::{FullConfig, Mode, ModeMap, ScaraArm};
+use crate::plant::{Body, DeltaArm, FullConfig, Mode, ModeMap, ScaraArm};
 
 /// Lowest frequency that a posture-dependent mode falls to.
 const MODE_MIN_HZ: f64 = 0.1;
@@ -25,6 +26,8 @@ pub struct PlantConfig {
     pub link1_mm: f64,
     /// Forearm in millimetres.
     pub link2_mm: f64,
+    /// The robot is this delta, and no SCARA.
+    pub delta: Option<DeltaArm>,
     /// The end effector's mode.
     pub mode: Mode,
     /// Change of its frequency for each mm further from the shoulder; full plant only.
@@ -33,9 +36,9 @@ pub struct PlantConfig {
     pub mode_reference_mm: f64,
     /// Mass that swings in the mode.
     pub tool_mass_kg: f64,
-    /// Largest error of an encoder reading, joints 1, 2 and 4.
+    /// Largest error of an encoder reading of a joint that turns.
     pub encoder_noise_rad: f64,
-    /// Largest error of an encoder reading, joint 3.
+    /// Largest error of an encoder reading of a quill.
     pub encoder_noise_mm: f64,
     /// Seed of the noise.
     pub noise_seed: u64,
@@ -48,6 +51,7 @@ impl Default for PlantConfig {
         Self {
             link1_mm: 200.0,
             link2_mm: 150.0,
+            delta: None,
             mode: Mode::default(),
             mode_slope_hz_per_mm: 0.0,
             mode_reference_mm: 225.0,
@@ -93,6 +97,7 @@ impl PlantConfig {
     /// # Errors
     /// The first setting that is out of its range.
     pub fn check(&self) -> Result<(), PlantConfigError> {
+        let delta = self.delta.unwrap_or_default();
         let ranges = [
             (
                 "plant.mode_frequency_hz",
@@ -114,6 +119,10 @@ impl PlantConfig {
                 2000.0,
             ),
             ("plant.tool_mass_kg", self.tool_mass_kg, 0.0, 5.0),
+            ("plant.upper_arm_kg", delta.upper_arm_kg, 0.01, 100.0),
+            ("plant.forearm_kg", delta.forearm_kg, 0.01, 100.0),
+            ("plant.platform_kg", delta.platform_kg, 0.01, 100.0),
+            ("plant.end_effector_kg", delta.end_effector_kg, 0.0, 100.0),
             ("plant.encoder_noise_rad", self.encoder_noise_rad, 0.0, 1e-3),
             ("plant.encoder_noise_mm", self.encoder_noise_mm, 0.0, 1.0),
         ];
@@ -140,27 +149,46 @@ impl PlantConfig {
         Ok(())
     }
 
-    /// The full plant at rest with its joints at `start` (rad, rad, mm, rad).
+    /// The full plant at rest with its joints at `start` (rad, a quill's mm).
     #[must_use]
     pub fn full(&self, start: [f64; JOINTS]) -> FullConfig {
+        let kind = self
+            .delta
+            .map_or_else(FullConfig::default, FullConfig::delta);
         let mut config = FullConfig {
-            arm: ScaraArm {
-                link1_mm: self.link1_mm,
-                link2_mm: self.link2_mm,
-            },
+            body: self.body(),
             tool_mass_kg: self.tool_mass_kg,
             mode: self.mode_map(),
             seed: self.noise_seed,
             start,
-            ..FullConfig::default()
+            ..kind
         };
         let noise = self.encoder_noise_rad;
-        let noise = [noise, noise, self.encoder_noise_mm / 1e3, noise];
+        let third = match self.delta {
+            None => self.encoder_noise_mm / 1e3,
+            Some(_) => noise,
+        };
+        let noise = [noise, noise, third, noise];
         for ((joint, noise), servo) in config.joints.iter_mut().zip(noise).zip(self.servos) {
             joint.encoder_noise = noise;
             joint.servo = servo;
         }
         config
+    }
+
+    /// What the joints move.
+    #[must_use]
+    pub fn body(&self) -> Body {
+        match self.delta {
+            Some(delta) => Body::Delta(delta),
+            None => Body::Scara {
+                arm: ScaraArm {
+                    link1_mm: self.link1_mm,
+                    link2_mm: self.link2_mm,
+                },
+                inertia: ArmInertia::default(),
+            },
+        }
     }
 
     fn mode_map(&self) -> ModeMap {
@@ -189,7 +217,7 @@ mod tests {
             assert!((ours.encoder_noise / own.encoder_noise - 1.0).abs() < 1e-12);
             ours.encoder_noise = own.encoder_noise;
         }
-        assert_eq!(ours.arm, own.arm);
+        assert_eq!(ours.body, own.body);
         assert_eq!(ours.joints, own.joints);
         assert_eq!((ours.tool_mass_kg, ours.seed), (own.tool_mass_kg, own.seed));
         assert_eq!(ours.mode.at([1.0, 2.0, 3.0]), Mode::default());

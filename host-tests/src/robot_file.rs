@@ -7,13 +7,13 @@ use std::fmt;
 use std::path::Path;
 
 use planner_core::config::{ConfigError, Robot, RobotConfig};
-use planner_core::kinematics::{Elbow, JointRange, ScaraError};
+use planner_core::kinematics::{ArmKind, DeltaConfig, DeltaError, Elbow, JointRange, ScaraError};
 use planner_core::posture::{FollowError, MapError};
 use planner_core::prefilter::{CustomImpulse, Kind, MAX_IMPULSES, PrefilterConfig, PrefilterError};
 use planner_core::servo::ServoConfig;
 use serde::{Deserialize, Deserializer};
 
-use crate::plant::Mode;
+use crate::plant::{DeltaArm, FullConfig, Mode};
 use crate::plant_config::PlantConfig;
 use crate::toml_place::{key_at, line_at, line_of};
 
@@ -129,6 +129,16 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
             ScaraError::JointLimits(_) => vec!["arm.joint4"],
             ScaraError::ElbowSide => vec!["arm.joint2", "arm.elbow"],
         },
+        ConfigError::Delta(error) => match error {
+            DeltaError::Radii => vec!["delta.base_radius_mm", "delta.platform_radius_mm"],
+            DeltaError::UpperArm => vec!["delta.upper_arm_mm"],
+            DeltaError::Forearm => vec!["delta.forearm_mm"],
+            DeltaError::Reach => vec!["delta.forearm_mm", "delta.upper_arm_mm"],
+            DeltaError::ArmLimits => vec!["delta.arm"],
+            DeltaError::YawLimits => vec!["delta.yaw"],
+            DeltaError::SerialMargin => vec!["delta.serial_margin_deg"],
+            DeltaError::ParallelMargin => vec!["delta.parallel_margin"],
+        },
         ConfigError::Prefilter(error) => match error {
             PrefilterError::Frequency { .. } => vec!["prefilter.frequency_hz"],
             PrefilterError::Damping { .. } => vec!["prefilter.damping"],
@@ -174,7 +184,9 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
 #[derive(Deserialize, Default)]
 #[serde(default, deny_unknown_fields)]
 struct Tables {
+    robot: Option<RobotName>,
     arm: ArmTable,
+    delta: DeltaTable,
     prefilter: PrefilterTable,
     motion: MotionTable,
     plant: PlantTable,
@@ -192,6 +204,26 @@ struct ArmTable {
     joint2: TurnTable,
     joint3: QuillTable,
     joint4: TurnTable,
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "lowercase")]
+enum RobotName {
+    Scara,
+    Delta,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct DeltaTable {
+    base_radius_mm: Option<f32>,
+    platform_radius_mm: Option<f32>,
+    upper_arm_mm: Option<f32>,
+    forearm_mm: Option<f32>,
+    arm: TurnTable,
+    yaw: TurnTable,
+    serial_margin_deg: Option<f32>,
+    parallel_margin: Option<f32>,
 }
 
 #[derive(Deserialize, Clone, Copy)]
@@ -268,6 +300,10 @@ struct PlantTable {
     mode_slope_hz_per_mm: Option<f64>,
     mode_reference_mm: Option<f64>,
     tool_mass_kg: Option<f64>,
+    upper_arm_kg: Option<f64>,
+    forearm_kg: Option<f64>,
+    platform_kg: Option<f64>,
+    end_effector_kg: Option<f64>,
     encoder_noise_rad: Option<f64>,
     encoder_noise_mm: Option<f64>,
     noise_seed: Option<u64>,
@@ -351,6 +387,8 @@ impl Tables {
             set(min, travel.0);
             set(max, travel.1);
         }
+        set(&mut robot.arm, self.robot.map(ArmKind::from));
+        self.delta.apply(&mut robot.delta);
         self.prefilter.apply(&mut robot.prefilter);
         let motion = &self.motion;
         set(&mut robot.corner_tolerance_mm, motion.corner_tolerance_mm);
@@ -369,6 +407,21 @@ impl Tables {
             table.apply(servo);
         }
         RobotSettings { plant, robot }
+    }
+}
+
+impl DeltaTable {
+    fn apply(&self, delta: &mut DeltaConfig) {
+        set(&mut delta.base_radius_mm, self.base_radius_mm);
+        set(&mut delta.platform_radius_mm, self.platform_radius_mm);
+        set(&mut delta.upper_arm_mm, self.upper_arm_mm);
+        set(&mut delta.forearm_mm, self.forearm_mm);
+        set(&mut delta.arm_limits.min, self.arm.min_deg);
+        set(&mut delta.arm_limits.max, self.arm.max_deg);
+        set(&mut delta.yaw_limits.min, self.yaw.min_deg);
+        set(&mut delta.yaw_limits.max, self.yaw.max_deg);
+        set(&mut delta.serial_margin_deg, self.serial_margin_deg);
+        set(&mut delta.parallel_margin, self.parallel_margin);
     }
 }
 
@@ -398,6 +451,11 @@ impl PlantTable {
             link2_mm: robot.scara.link2_mm.into(),
             ..PlantConfig::default()
         };
+        if robot.arm == ArmKind::Delta {
+            let delta = self.delta(&robot.delta);
+            plant.servos = FullConfig::delta(delta).joints.map(|joint| joint.servo);
+            plant.delta = Some(delta);
+        }
         let Mode {
             frequency_hz,
             damping,
@@ -411,6 +469,30 @@ impl PlantTable {
         set(&mut plant.encoder_noise_mm, self.encoder_noise_mm);
         set(&mut plant.noise_seed, self.noise_seed);
         plant
+    }
+
+    /// The arms of a delta: lengths as the planner believes them, masses as they are.
+    fn delta(&self, config: &DeltaConfig) -> DeltaArm {
+        let mut delta = DeltaArm {
+            offset_mm: f64::from(config.base_radius_mm) - f64::from(config.platform_radius_mm),
+            upper_arm_mm: config.upper_arm_mm.into(),
+            forearm_mm: config.forearm_mm.into(),
+            ..DeltaArm::default()
+        };
+        set(&mut delta.upper_arm_kg, self.upper_arm_kg);
+        set(&mut delta.forearm_kg, self.forearm_kg);
+        set(&mut delta.platform_kg, self.platform_kg);
+        set(&mut delta.end_effector_kg, self.end_effector_kg);
+        delta
+    }
+}
+
+impl From<RobotName> for ArmKind {
+    fn from(name: RobotName) -> Self {
+        match name {
+            RobotName::Scara => Self::Scara,
+            RobotName::Delta => Self::Delta,
+        }
     }
 }
 
@@ -454,6 +536,34 @@ mod tests {
         assert_eq!(shipped, RobotSettings::parse("empty", "").unwrap());
         assert_eq!(shipped.robot, RobotConfig::default());
         assert_eq!(shipped.plant, PlantConfig::default());
+    }
+
+    #[test]
+    fn the_deltas_file_states_its_defaults() {
+        let text = include_str!("../robots/delta-800.toml");
+        let shipped = RobotSettings::parse("delta-800.toml", text).unwrap();
+        assert_eq!(shipped.robot.arm, ArmKind::Delta);
+        assert_eq!(shipped.robot.delta, DeltaConfig::default());
+        // to the precision of the planner's lengths
+        let delta = shipped.plant.delta.unwrap();
+        let standard = DeltaArm::default();
+        assert!((delta.upper_arm_mm - standard.upper_arm_mm).abs() < 1e-4);
+        let rounded = DeltaArm {
+            upper_arm_mm: standard.upper_arm_mm,
+            ..delta
+        };
+        assert_eq!(rounded, standard);
+    }
+
+    #[test]
+    fn a_deltas_keys_reach_their_settings() {
+        let text = "robot = 'delta'\n[delta]\nforearm_mm = 700\narm.max_deg = 80\n\
+                    [plant]\nplatform_kg = 2.5";
+        let found = RobotSettings::parse("r.toml", text).unwrap();
+        assert_eq!(found.robot.delta.forearm_mm, 700.0);
+        assert_eq!(found.robot.delta.arm_limits.max, 80.0);
+        let delta = found.plant.delta.unwrap();
+        assert_eq!((delta.forearm_mm, delta.platform_kg), (700.0, 2.5));
     }
 
     #[test]
@@ -555,6 +665,18 @@ mod tests {
             (
                 "plant.mode_damping = 2",
                 "r.toml, line 1, key plant.mode_damping: 2 is outside 0 to 0.9",
+            ),
+            (
+                "robot = 'gantry'",
+                "r.toml, line 1, key robot: unknown variant `gantry`",
+            ),
+            (
+                "robot = 'delta'\n[delta]\nforearm_mm = 2",
+                "r.toml, line 3, key delta.forearm_mm: the delta's forearm",
+            ),
+            (
+                "robot = 'delta'\nplant.platform_kg = 0",
+                "r.toml, line 2, key plant.platform_kg: 0 is outside",
             ),
             ("[arm\n", "r.toml, line 1: "),
         ] {

@@ -6,6 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use planner_core::motion::MotionState;
+use planner_core::pose::JointUnit;
 use planner_core::telemetry::{FrameDecoder, SetpointFrame};
 use serde_json::{Value, json};
 
@@ -113,9 +114,10 @@ impl Watched {
         let Some(frame) = &self.frame else {
             return vec!["joints   no setpoint yet".to_owned()];
         };
-        let [j1, j2, j3, j4] = self.joints(frame);
+        let [j1, j2, j3, j4] = joints(frame);
+        let third = third_unit(frame).sign();
         vec![
-            format!("joints   {j1:.3}°  {j2:.3}°  {j3:.3} mm  {j4:.3}°"),
+            format!("joints   {j1:.3}°  {j2:.3}°  {j3:.3}{third}  {j4:.3}°"),
             format!(
                 "ticks    {}, cost {}, at most {}, overruns {}; frames lost {}, bad {}",
                 frame.sequence,
@@ -134,7 +136,11 @@ impl Watched {
         let Some(frame) = &self.frame else {
             return Value::Null;
         };
-        let [j1, j2, j3, j4] = self.joints(frame);
+        let [j1, j2, j3, j4] = joints(frame);
+        let third = match third_unit(frame) {
+            JointUnit::Angle => "joint3_deg",
+            JointUnit::Length => "joint3_mm",
+        };
         let pose = frame.setpoint.pose;
         json!({
             "sequence": frame.sequence,
@@ -145,7 +151,7 @@ impl Watched {
             "c_deg": pose.c.to_num::<f64>(),
             "joint1_deg": j1,
             "joint2_deg": j2,
-            "joint3_mm": j3,
+            third: j3,
             "joint4_deg": j4,
             "tick_cost": frame.tick_cost,
             "worst_tick": self.worst_tick,
@@ -154,15 +160,20 @@ impl Watched {
             "bad": self.bad,
         })
     }
+}
 
-    /// Degrees, the third mm.
-    fn joints(&self, frame: &SetpointFrame) -> [f64; 4] {
-        let joints = frame.setpoint.joints.position;
-        [
-            joints.joint1.to_num::<f64>().to_degrees(),
-            joints.joint2.to_num::<f64>().to_degrees(),
-            joints.joint3.as_length().to_num::<f64>(),
-            joints.joint4.to_num::<f64>().to_degrees(),
-        ]
-    }
+/// Degrees, a quill's mm.
+fn joints(frame: &SetpointFrame) -> [f64; 4] {
+    let units = frame.setpoint.arm.joint_units();
+    let values = frame.setpoint.joints.position.values(units);
+    let mut units = units.into_iter();
+    values.map(|value| match units.next() {
+        Some(JointUnit::Angle) => value.to_degrees(),
+        _ => value,
+    })
+}
+
+fn third_unit(frame: &SetpointFrame) -> JointUnit {
+    let [_, _, third, _] = frame.setpoint.arm.joint_units();
+    third
 }

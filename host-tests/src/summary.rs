@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::Result;
+use planner_core::pose::JointUnit;
 use serde::Serialize;
 
 use crate::checker::Report;
@@ -62,8 +63,12 @@ pub struct Figures {
     pub joint1_peak_rad_s2: f64,
     /// Likewise of joint 2.
     pub joint2_peak_rad_s2: f64,
-    /// Likewise of joint 3.
-    pub joint3_peak_mm_s2: f64,
+    /// Likewise of joint 3, being a quill.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint3_peak_mm_s2: Option<f64>,
+    /// Likewise of joint 3, being an arm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint3_peak_rad_s2: Option<f64>,
     /// Likewise of joint 4.
     pub joint4_peak_rad_s2: f64,
 }
@@ -133,6 +138,7 @@ impl Figures {
         let report = outcome.checked.as_ref().ok().map(|(_, report)| report);
         let vibration = outcome.vibration;
         let [joint1, joint2, joint3, joint4] = outcome.joint_peaks.acceleration;
+        let [_, _, third, _] = outcome.trace.joint_units();
         Self {
             cycle_time_s: outcome.cycle_time_s,
             settling_time_s: outcome.settling_time_s,
@@ -146,7 +152,8 @@ impl Figures {
             vibration_residual_rms_mm_s2: vibration.residual_rms_mm_s2,
             joint1_peak_rad_s2: joint1,
             joint2_peak_rad_s2: joint2,
-            joint3_peak_mm_s2: joint3,
+            joint3_peak_mm_s2: (third == JointUnit::Length).then_some(joint3),
+            joint3_peak_rad_s2: (third == JointUnit::Angle).then_some(joint3),
             joint4_peak_rad_s2: joint4,
         }
     }

@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use planner_core::motion::Setpoint;
+use planner_core::pose::{AXES, JointUnit};
 use planner_core::units::{TICK_HZ, TICK_S};
 
 use crate::plant::full::LATENCY_TICKS;
@@ -124,6 +125,13 @@ impl Trace {
     #[must_use]
     pub fn poses(&self) -> Vec<[f64; 4]> {
         self.setpoints.iter().map(pose).collect()
+    }
+
+    /// What the joints' positions count.
+    #[must_use]
+    pub fn joint_units(&self) -> [JointUnit; AXES] {
+        let arm = self.setpoints.first().map(|setpoint| setpoint.arm);
+        arm.unwrap_or_default().joint_units()
     }
 
     /// Joint setpoints: rad, a quill's mm.

@@ -3,7 +3,9 @@
 use core::fmt;
 
 use crate::corner::CornerRule;
-use crate::kinematics::{Arm, ArmKind, Elbow, JointRange, Scara, ScaraConfig, ScaraError};
+use crate::kinematics::{
+    Arm, ArmKind, Delta, DeltaConfig, DeltaError, Elbow, JointRange, Scara, ScaraConfig, ScaraError,
+};
 use crate::pose::AXES;
 use crate::posture::{FollowConfig, FollowError, Follower, ModeMapConfig, PostureMethod, Tuning};
 use crate::prefilter::{Kernel, Kind, Prefilter, PrefilterConfig, PrefilterError, Response};
@@ -15,6 +17,8 @@ pub struct RobotConfig {
     pub arm: ArmKind,
     /// Arm lengths, elbow and joint limits, if it is a SCARA.
     pub scara: ScaraConfig,
+    /// Arm lengths and limits, if it is a delta.
+    pub delta: DeltaConfig,
     /// Which vibration to suppress, and how.
     pub prefilter: PrefilterConfig,
     /// The mode over the workspace; without it the prefilter's is the mode everywhere.
@@ -41,6 +45,7 @@ impl Default for RobotConfig {
         Self {
             arm: ArmKind::default(),
             scara: ScaraConfig::default(),
+            delta: DeltaConfig::default(),
             prefilter: PrefilterConfig::default(),
             map: ModeMapConfig::NONE,
             posture_method: PostureMethod::Local,
@@ -57,8 +62,10 @@ impl Default for RobotConfig {
 /// Why a robot's settings are refused; names the setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ConfigError {
-    /// The arm's geometry.
+    /// The SCARA's geometry.
     Scara(ScaraError),
+    /// The delta's geometry.
+    Delta(DeltaError),
     /// The prefilter.
     Prefilter(PrefilterError),
     /// The map of the mode, or the prefilters that follow it.
@@ -82,6 +89,12 @@ impl From<ScaraError> for ConfigError {
     }
 }
 
+impl From<DeltaError> for ConfigError {
+    fn from(error: DeltaError) -> Self {
+        Self::Delta(error)
+    }
+}
+
 impl From<PrefilterError> for ConfigError {
     fn from(error: PrefilterError) -> Self {
         Self::Prefilter(error)
@@ -92,6 +105,7 @@ impl fmt::Display for ConfigError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Scara(error) => error.fmt(f),
+            Self::Delta(error) => error.fmt(f),
             Self::Prefilter(error) => error.fmt(f),
             Self::Follow(error) => error.fmt(f),
             Self::Range {
@@ -161,6 +175,7 @@ impl Robot {
             config: *config,
             arm: match config.arm {
                 ArmKind::Scara => Arm::Scara(Scara::new(&config.scara)?),
+                ArmKind::Delta => Arm::Delta(Delta::new(&config.delta)?),
             },
             follower,
             tuning,
@@ -171,7 +186,7 @@ impl Robot {
         })
     }
 
-    /// Changes the side of the elbow.
+    /// Changes the side of a SCARA's elbow.
     pub fn set_elbow(&mut self, elbow: Elbow) {
         self.config.scara.elbow = elbow;
         self.arm.set_elbow(elbow);
@@ -253,6 +268,7 @@ enum Slot<'a> {
     Number(&'a mut f32),
     Prefilter(&'a mut Kind),
     Elbow(&'a mut Elbow),
+    Arm(&'a mut ArmKind),
 }
 
 /// The value of a setting, as text shows it.
@@ -287,7 +303,20 @@ impl RobotConfig {
 
     /// Names of all settings, in groups whose values must fit each other: lengths in mm, angles
     /// in °, the frequency in Hz, feedrates in mm/s, the yaw limit in °/s.
-    pub const GROUPS: [&'static [&'static str]; 16] = [
+    pub const GROUPS: [&'static [&'static str]; 17] = [
+        &[
+            "robot",
+            "delta-base",
+            "delta-platform",
+            "delta-upper-arm",
+            "delta-forearm",
+            "delta-arm-min",
+            "delta-arm-max",
+            "delta-yaw-min",
+            "delta-yaw-max",
+            "delta-serial-margin",
+            "delta-parallel-margin",
+        ],
         &["link1", "link2"],
         &["elbow", "joint2-min", "joint2-max", "singularity-margin"],
         &["joint1-min", "joint1-max"],
@@ -325,6 +354,10 @@ impl RobotConfig {
     pub const fn joint_limits(&self) -> [JointRange; AXES] {
         match self.arm {
             ArmKind::Scara => self.scara.joint_limits,
+            ArmKind::Delta => {
+                let (arm, yaw) = (self.delta.arm_limits, self.delta.yaw_limits);
+                [arm, arm, arm, yaw]
+            }
         }
     }
 
@@ -355,7 +388,8 @@ impl RobotConfig {
         match self.slot(name.trim()).ok_or(SettingError::Unknown)? {
             Slot::Number(number) => *number = value.parse().map_err(|_| SettingError::Value)?,
             Slot::Prefilter(kind) => *kind = Kind::from_name(value).ok_or(SettingError::Value)?,
-            Slot::Elbow(elbow) => *elbow = elbow_named(value).ok_or(SettingError::Value)?,
+            Slot::Elbow(elbow) => *elbow = named(&ELBOWS, value).ok_or(SettingError::Value)?,
+            Slot::Arm(arm) => *arm = named(&ARMS, value).ok_or(SettingError::Value)?,
         }
         Ok(())
     }
@@ -369,7 +403,12 @@ impl RobotConfig {
                 *kind = Kind::ALL.get(value as usize).copied().unwrap_or(*kind);
             }
             Some(Slot::Elbow(elbow)) => {
-                *elbow = ELBOWS.get(value as usize).copied().unwrap_or(*elbow);
+                *elbow = ELBOWS
+                    .get(value as usize)
+                    .map_or(*elbow, |(_, elbow)| *elbow);
+            }
+            Some(Slot::Arm(arm)) => {
+                *arm = ARMS.get(value as usize).map_or(*arm, |(_, arm)| *arm);
             }
             None => {}
         }
@@ -382,7 +421,8 @@ impl RobotConfig {
         Some(match copy.slot(name)? {
             Slot::Number(number) => SettingValue::Number(*number),
             Slot::Prefilter(kind) => SettingValue::Name(kind.name()),
-            Slot::Elbow(elbow) => SettingValue::Name(elbow_name(*elbow)),
+            Slot::Elbow(elbow) => SettingValue::Name(name_of(&ELBOWS, elbow)),
+            Slot::Arm(arm) => SettingValue::Name(name_of(&ARMS, arm)),
         })
     }
 
@@ -395,6 +435,7 @@ impl RobotConfig {
         Some(match name {
             "prefilter" => Slot::Prefilter(&mut prefilter.kind),
             "prefilter2" => Slot::Prefilter(&mut second.kind),
+            "robot" => Slot::Arm(&mut self.arm),
             "elbow" => Slot::Elbow(&mut self.scara.elbow),
             "link1" => Slot::Number(&mut self.scara.link1_mm),
             "link2" => Slot::Number(&mut self.scara.link2_mm),
@@ -407,6 +448,16 @@ impl RobotConfig {
             "joint3-max" => Slot::Number(&mut joint3.max),
             "joint4-min" => Slot::Number(&mut joint4.min),
             "joint4-max" => Slot::Number(&mut joint4.max),
+            "delta-base" => Slot::Number(&mut self.delta.base_radius_mm),
+            "delta-platform" => Slot::Number(&mut self.delta.platform_radius_mm),
+            "delta-upper-arm" => Slot::Number(&mut self.delta.upper_arm_mm),
+            "delta-forearm" => Slot::Number(&mut self.delta.forearm_mm),
+            "delta-arm-min" => Slot::Number(&mut self.delta.arm_limits.min),
+            "delta-arm-max" => Slot::Number(&mut self.delta.arm_limits.max),
+            "delta-yaw-min" => Slot::Number(&mut self.delta.yaw_limits.min),
+            "delta-yaw-max" => Slot::Number(&mut self.delta.yaw_limits.max),
+            "delta-serial-margin" => Slot::Number(&mut self.delta.serial_margin_deg),
+            "delta-parallel-margin" => Slot::Number(&mut self.delta.parallel_margin),
             "frequency" => Slot::Number(&mut prefilter.frequency_hz),
             "damping" => Slot::Number(&mut prefilter.damping),
             "v-tol" => Slot::Number(&mut prefilter.v_tol),
@@ -437,20 +488,22 @@ impl RobotConfig {
     }
 }
 
-/// Both sides, in the order of their numbers.
-const ELBOWS: [Elbow; 2] = [Elbow::Left, Elbow::Right];
+/// Names of both sides, in the order of their numbers.
+const ELBOWS: [(&str, Elbow); 2] = [("left", Elbow::Left), ("right", Elbow::Right)];
 
-fn elbow_name(elbow: Elbow) -> &'static str {
-    match elbow {
-        Elbow::Left => "left",
-        Elbow::Right => "right",
-    }
+/// Names of the robots, likewise.
+const ARMS: [(&str, ArmKind); 2] = [("scara", ArmKind::Scara), ("delta", ArmKind::Delta)];
+
+fn name_of<T: PartialEq>(names: &[(&'static str, T)], value: &T) -> &'static str {
+    let row = names.iter().find(|(_, other)| other == value);
+    row.map_or("", |(name, _)| name)
 }
 
-fn elbow_named(name: &str) -> Option<Elbow> {
-    ELBOWS
-        .into_iter()
-        .find(|elbow| elbow_name(*elbow).eq_ignore_ascii_case(name))
+fn named<T: Copy>(names: &[(&str, T)], text: &str) -> Option<T> {
+    let row = names
+        .iter()
+        .find(|(name, _)| name.eq_ignore_ascii_case(text));
+    row.map(|(_, value)| *value)
 }
 
 #[cfg(test)]

@@ -230,12 +230,16 @@ impl<'q> Motion<'q> {
         if self.mode == Mode::Idle {
             let pose = self.pose();
             let joints = self.kinematics.inverse(&pose);
+            let kind = self.kinematics.kind();
             self.changeover.set_kernel(robot.kernel.clone());
             self.filters.lines.share(robot.follower.is_some());
             self.kinematics = robot.arm.clone();
             self.rest_at(self.nearest_point());
-            // Another arm at the same pose.
-            self.placed |= self.space == Space::Tool && self.kinematics.inverse(&pose) != joints;
+            // Another arm at the same pose, or with joints of another kind.
+            self.placed |= match self.space {
+                Space::Tool => self.kinematics.inverse(&pose) != joints,
+                Space::Joints => kind != self.kinematics.kind(),
+            };
         }
     }
 

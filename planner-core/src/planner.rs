@@ -61,6 +61,8 @@ pub enum Cause {
         /// How long it would take.
         duration_s: f64,
     },
+    /// M101 or M102 on a robot without an elbow.
+    NoElbow,
     /// The look-ahead is full: the caller did not wait for [`Planner::has_room`].
     Full,
 }
@@ -72,14 +74,17 @@ impl LineError {
         match self.cause {
             Cause::Gcode(error) => error.code(),
             Cause::Pose(cause) | Cause::Segment(SegmentError { cause, .. }) => match cause {
-                PoseError::Unreachable { .. } => 70,
-                PoseError::NearSingular { .. } => 71,
+                PoseError::Unreachable { .. } | PoseError::ArmUnreachable { .. } => 70,
+                PoseError::NearSingular { .. }
+                | PoseError::NearSerial { .. }
+                | PoseError::NearParallel { .. } => 71,
                 PoseError::JointLimit { .. } => 72,
             },
             Cause::Jog(_) => 15,
             Cause::TooSlow { .. } => 73,
             Cause::Full => 74,
             Cause::Prefilter(_) | Cause::MapSaysMode => 76,
+            Cause::NoElbow => 79,
         }
     }
 }
@@ -106,6 +111,9 @@ impl fmt::Display for LineError {
             ),
             Cause::MapSaysMode => f.write_str(
                 "the map says frequency and damping: give M100 without Q and R, or remove the map with $map=0",
+            ),
+            Cause::NoElbow => f.write_str(
+                "this robot has no elbow that could change its side: leave out M101 and M102",
             ),
             Cause::Full => f.write_str("the look-ahead is full: wait for ok before the next line"),
         }
@@ -463,13 +471,15 @@ impl<'q> Planner<'q> {
     /// Not inlined, so that the other arm is on the stack for a moment only.
     #[inline(never)]
     fn elbow_move(&self, arm: &Arm, elbow: Elbow) -> Result<Option<ElbowMove>, Cause> {
+        let Arm::Scara(scara) = arm else {
+            return Err(Cause::NoElbow);
+        };
         let Some(position) = self.interpreter.modal().position() else {
             return Ok(None);
         };
         if elbow == self.robot.config.scara.elbow && self.joints.is_none() {
             return Ok(None);
         }
-        let Arm::Scara(scara) = arm;
         let from = self.joints.unwrap_or_else(|| scara.inverse(&position));
         let mut scara = scara.clone();
         scara.set_elbow(elbow);

@@ -11,9 +11,9 @@
 //! | offset | field | |
 //! |---|---|---|
 //! | 0 | sequence | u32, one more each tick |
-//! | 4 | state | u8, 0 idle, 1 running, 2 stopping, 3 held, 4 paused; bit 7: placed |
+//! | 4 | state | u8, 0 idle, 1 running, 2 stopping, 3 held, 4 paused; bit 6: a delta's joints; bit 7: placed |
 //! | 5 | pose | 4 × i32, raw bits of X, Y, Z (2^-19 mm) and C (2^-19 °) |
-//! | 21 | joint position | 4 × i32, raw bits (2^-26 rad; joint 3 2^-19 mm) |
+//! | 21 | joint position | 4 × i32, raw bits (2^-26 rad; a SCARA's joint 3 2^-19 mm) |
 //! | 37 | joint velocity | 4 × f32, rad/s and mm/s |
 //! | 53 | joint acceleration | 4 × f32, rad/s² and mm/s² |
 //! | 69 | tick cost | u32, instructions or cycles of this tick, as the board counts |
@@ -35,6 +35,9 @@ pub const FRAME_BYTES: usize = cobs::max_encoding_length(CHECKED_BYTES) + 1;
 
 /// Marks a position that was set, in the byte of the state.
 const PLACED: u8 = 1 << 7;
+
+/// Marks the joints of a delta, likewise.
+const DELTA: u8 = 1 << 6;
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
@@ -71,7 +74,14 @@ impl SetpointFrame {
         let mut rest = body.as_mut_slice();
         put(&mut rest, self.sequence.to_le_bytes());
         let placed = if self.setpoint.placed { PLACED } else { 0 };
-        put(&mut rest, [state_to_byte(self.setpoint.state) | placed]);
+        let delta = match self.setpoint.arm {
+            ArmKind::Scara => 0,
+            ArmKind::Delta => DELTA,
+        };
+        put(
+            &mut rest,
+            [state_to_byte(self.setpoint.state) | delta | placed],
+        );
         for bits in self.setpoint.pose.to_bits() {
             put(&mut rest, bits.to_le_bytes());
         }
@@ -109,8 +119,12 @@ impl SetpointFrame {
                     velocity,
                     acceleration,
                 },
-                arm: ArmKind::Scara,
-                state: state_from_byte(state & !PLACED)?,
+                arm: if state & DELTA == 0 {
+                    ArmKind::Scara
+                } else {
+                    ArmKind::Delta
+                },
+                state: state_from_byte(state & !(PLACED | DELTA))?,
                 placed: state & PLACED != 0,
                 outputs,
             },
@@ -259,7 +273,7 @@ mod tests {
                     velocity: [0.0, -0.0, 1.5, f32::MIN_POSITIVE],
                     acceleration: [-1e9, 0.25, 0.0, 3.0],
                 },
-                arm: ArmKind::Scara,
+                arm: ArmKind::Delta,
                 state: MotionState::Running,
                 outputs: 2,
                 placed: true,
@@ -273,7 +287,7 @@ mod tests {
     #[test]
     fn the_layout_is_fixed() {
         let body = frame(0x0102_0304).body();
-        assert_eq!(body[..9], [4, 3, 2, 1, 0x81, 1, 0, 0, 0]);
+        assert_eq!(body[..9], [4, 3, 2, 1, 0xC1, 1, 0, 0, 0]);
         assert_eq!(body[9..13], [0xFE, 0xFF, 0xFF, 0xFF]);
         assert_eq!(body[21..25], [0xFF, 0xFF, 0xFF, 0x7F]);
         assert_eq!(body[41..45], [0, 0, 0, 0x80]);
@@ -337,6 +351,7 @@ mod tests {
         fn every_frame_survives(
             sequence: u32, pose: [i32; 4], position: [i32; 4], velocity: [u32; 4],
             acceleration: [u32; 4], tick_cost: u32, overruns: u32, state: u8, outputs: u8, placed: bool,
+            is_delta: bool,
         ) {
             let sent = SetpointFrame {
                 sequence,
@@ -347,7 +362,11 @@ mod tests {
                         velocity: velocity.map(f32::from_bits),
                         acceleration: acceleration.map(f32::from_bits),
                     },
-                    arm: ArmKind::Scara,
+                    arm: if is_delta {
+                        ArmKind::Delta
+                    } else {
+                        ArmKind::Scara
+                    },
                     state: state_from_byte(state % 5).unwrap(),
                     outputs,
                     placed,

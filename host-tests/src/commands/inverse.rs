@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::{Result, anyhow};
 use clap::{Args, ValueEnum};
-use fixed::types::{I6F26, I13F19};
+use fixed::types::I13F19;
 use planner_core::config::Robot;
-use planner_core::kinematics::Elbow;
-use planner_core::pose::Pose;
+use planner_core::kinematics::{ArmKind, Elbow};
+use planner_core::pose::{JointUnit, Pose};
 use serde::Serialize;
 
 use crate::robot_file::RobotSettings;
@@ -59,6 +59,11 @@ struct Joints {
 pub fn execute(args: &InverseArgs) -> Result<String> {
     let mut config = RobotSettings::load(args.robot.as_deref())?.robot;
     if let Some(elbow) = args.elbow {
+        if config.arm == ArmKind::Delta {
+            return Err(anyhow!(
+                "a delta robot has no elbow side: leave out --elbow"
+            ));
+        }
         config.scara.elbow = match elbow {
             ElbowArg::Left => Elbow::Left,
             ElbowArg::Right => Elbow::Right,
@@ -72,12 +77,19 @@ pub fn execute(args: &InverseArgs) -> Result<String> {
         c: coordinate("C", args.c)?,
     };
     let joints = robot.arm.check(&pose)?;
-    let degrees = |angle: I6F26| angle.to_num::<f64>().to_degrees();
+    let units = robot.arm.kind().joint_units();
+    let mut values = joints.values(units);
+    for (value, unit) in values.iter_mut().zip(units) {
+        if unit == JointUnit::Angle {
+            *value = value.to_degrees();
+        }
+    }
+    let [joint1, joint2, joint3, joint4] = values;
     let joints = Joints {
-        joint1: degrees(joints.joint1),
-        joint2: degrees(joints.joint2),
-        joint3: joints.joint3.as_length().to_num(),
-        joint4: degrees(joints.joint4),
+        joint1,
+        joint2,
+        joint3,
+        joint4,
     };
     if args.json {
         return Ok(serde_json::to_string(&joints)?);
@@ -85,7 +97,7 @@ pub fn execute(args: &InverseArgs) -> Result<String> {
     let lines = [
         format!("joint1 {:.6}°", joints.joint1),
         format!("joint2 {:.6}°", joints.joint2),
-        format!("joint3 {:.6} mm", joints.joint3),
+        format!("joint3 {:.6}{}", joints.joint3, units[2].sign()),
         format!("joint4 {:.6}°", joints.joint4),
     ];
     Ok(lines.join("\n"))

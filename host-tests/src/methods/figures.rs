@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::{Point, STEP_S, Task};
 use crate::checker::{joint_peaks, matching::distance_to_chord};
-use crate::plant::{Elbow, IdealPlant};
+use crate::plant::IdealPlant;
 use crate::vibration::{Vibration, moving_samples};
 
 /// Time recorded after the stop, in samples.
@@ -46,7 +46,7 @@ impl Figures {
 
         let joints: Option<Vec<_>> = command[..moving]
             .iter()
-            .map(|&[x, y, z]| task.arm.inverse([x, y, z, 0.0], Elbow::Right))
+            .map(|&[x, y, z]| task.body.inverse([x, y, z, 0.0]))
             .collect();
         let joints = joints.context("the command leaves the arm's reach")?;
         let [joint1, joint2, ..] = joint_peaks(&joints, STEP_S).acceleration;

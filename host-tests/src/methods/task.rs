@@ -5,7 +5,7 @@ use anyhow::{Context, Result};
 use super::Point;
 use crate::checker::Program;
 use crate::oracle::{Geometry, Prefilter};
-use crate::plant::{Mode, ScaraArm};
+use crate::plant::{Body, Mode};
 use crate::scenario::Scenario;
 use crate::vector::xyz;
 
@@ -24,7 +24,7 @@ pub struct Task {
     /// The mode of the tool, the same along X, Y and Z.
     pub mode: Mode,
     /// The arm.
-    pub arm: ScaraArm,
+    pub body: Body,
 }
 
 impl Task {
@@ -58,10 +58,7 @@ impl Task {
                 .collect(),
             tolerance_mm: robot.corner_tolerance_mm.into(),
             mode: scenario.settings.plant.mode,
-            arm: ScaraArm {
-                link1_mm: robot.scara.link1_mm.into(),
-                link2_mm: robot.scara.link2_mm.into(),
-            },
+            body: scenario.settings.plant.body(),
         })
     }
 

@@ -12,6 +12,7 @@ use super::canvas::{
 use super::polyline::{bounds, clip, equal_scale, thin, thin_to};
 use crate::checker::CornerCheck;
 use crate::paired_run::PairedRun;
+use crate::vector::xyz;
 
 const SIZE: (u32, u32) = (1280, 800);
 const MAP_WIDTH: u32 = 600;
@@ -28,8 +29,13 @@ const REACH: f64 = 2.2;
 /// ... and in mm where the corner is an exact stop.
 const REACH_AT_STOP_MM: f64 = 0.5;
 
+/// The two axes of space that a picture shows.
+#[derive(Clone, Copy)]
+struct Plane([usize; 2]);
+
 /// The lines that map and corners share.
 struct Lines {
+    plane: Plane,
     programmed: Vec<Point>,
     commanded: Vec<Point>,
     tool: Vec<Point>,
@@ -104,29 +110,65 @@ fn enlarged_corners(run: &PairedRun) -> Vec<CornerCheck> {
     corners
 }
 
+impl Plane {
+    /// The plane in which a path is widest: from above, or from a side if it is higher than it
+    /// is wide in one direction.
+    fn of(poses: &[[f64; 4]]) -> Self {
+        let spread = |axis: usize| {
+            let ends = poses
+                .iter()
+                .fold((f64::MAX, f64::MIN), |(low, high), pose| {
+                    (low.min(pose[axis]), high.max(pose[axis]))
+                });
+            ends.1 - ends.0
+        };
+        let (x, y, z) = (spread(0), spread(1), spread(2));
+        Self(match () {
+            () if z <= x.min(y) => [0, 1],
+            () if x >= y => [0, 2],
+            () => [1, 2],
+        })
+    }
+
+    fn point(self, point: [f64; 3]) -> Point {
+        (point[self.0[0]], point[self.0[1]])
+    }
+
+    fn labels(self, rest: &str) -> [String; 2] {
+        self.0
+            .map(|axis| format!("{}{rest}", ["X", "Y", "Z"][axis]))
+    }
+}
+
 impl Lines {
     fn new(run: &PairedRun) -> Self {
         let trace = &run.outcome.trace;
+        let plane = Plane::of(&trace.poses());
         let programmed = run
             .outcome
             .checked
             .as_ref()
             .map_or(Vec::new(), |(program, _)| {
-                let start = (program.start[0], program.start[1]);
+                let start = plane.point(xyz(program.start));
                 let blocks = program.blocks.iter().flat_map(|block| block.points());
                 let points: Vec<_> = std::iter::once(start)
-                    .chain(blocks.map(|[x, y, _]| (x, y)))
+                    .chain(blocks.map(|point| plane.point(point)))
                     .collect();
                 points
             });
         Self {
             programmed,
-            commanded: trace.poses().into_iter().map(|[x, y, ..]| (x, y)).collect(),
+            commanded: trace
+                .poses()
+                .into_iter()
+                .map(|pose| plane.point(xyz(pose)))
+                .collect(),
             tool: trace
                 .tool
                 .iter()
-                .map(|sample| (sample.position_mm[0], sample.position_mm[1]))
+                .map(|sample| plane.point(sample.position_mm))
                 .collect(),
+            plane,
         }
     }
 }
@@ -139,7 +181,12 @@ fn map(area: &Area<'_>, path: &Lines, corners: &[CornerCheck]) -> Result<()> {
     let size = plot_size(area);
     let window = equal_scale(around, size);
     let unit = (window[0].1 - window[0].0) / size.0;
-    let mut chart = axes(area, window, ["X, mm", "Y, mm"], [8, 8])?;
+    let mut chart = axes(
+        area,
+        window,
+        path.plane.labels(", mm").each_ref().map(String::as_str),
+        [8, 8],
+    )?;
     for (points, colour, width) in [
         (&path.programmed, BACKGROUND, 6),
         (&path.tool, CONTRAST, 1),
@@ -173,7 +220,7 @@ fn marks(path: &Lines, corners: &[CornerCheck], near: f64) -> Vec<(String, Point
     let ends = ["start", "end"].into_iter().zip(ends);
     let ends = ends.filter_map(|(name, at)| Some((name.to_owned(), *at?)));
     let corners = (1..).zip(corners).map(|(number, corner)| {
-        let at = (corner.point_mm[0], corner.point_mm[1]);
+        let at = path.plane.point(corner.point_mm);
         (format!("{number}"), at)
     });
     let mut marks: Vec<(String, Point)> = Vec::new();
@@ -217,8 +264,16 @@ fn enlarged(area: &Area<'_>, path: &Lines, corner: &CornerCheck, number: usize) 
     let side = [(-reach, reach), (-reach, reach)];
     let window = equal_scale(side, size);
     let unit = (window[0].1 - window[0].0) / size.0;
-    let mut chart = axes(&area, window, ["X − corner, mm", "Y − corner, mm"], [5, 5])?;
-    let (x, y) = (corner.point_mm[0], corner.point_mm[1]);
+    let mut chart = axes(
+        &area,
+        window,
+        path.plane
+            .labels(" − corner, mm")
+            .each_ref()
+            .map(String::as_str),
+        [5, 5],
+    )?;
+    let (x, y) = path.plane.point(corner.point_mm);
     let row = (corner.time_s / TICK_S).round() as usize;
     let seen = (window[0].1).hypot(window[1].1);
     let pass = |points| passage(points, row, (x, y), seen);

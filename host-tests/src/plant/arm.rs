@@ -111,6 +111,17 @@ pub struct ArmInertia {
     pub d: f64,
 }
 
+impl Default for ArmInertia {
+    /// Upper arm 3 kg, forearm with quill 2.5 kg, its centre 80 mm from the elbow.
+    fn default() -> Self {
+        Self {
+            a: 0.166,
+            b: 0.040,
+            d: 0.026,
+        }
+    }
+}
+
 impl ArmInertia {
     /// Mass matrix by rows.
     #[must_use]

@@ -6,6 +6,8 @@ use std::sync::Arc;
 use planner_core::servo::{ServoConfig, Travel};
 
 use super::arm::{ArmInertia, ScaraArm};
+use super::body::Body;
+use super::delta_arm::DeltaArm;
 use super::mode::Mode;
 
 /// Joints of the robot.
@@ -46,7 +48,7 @@ impl fmt::Debug for ModeMap {
     }
 }
 
-/// One joint with its servo; joint 3 in metres and newtons.
+/// One joint with its servo; a quill in metres and newtons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointConfig {
     /// Its servo, and with it the inertia of its motor.
@@ -55,7 +57,7 @@ pub struct JointConfig {
     pub stiffness: f64,
     /// Damping between motor and link: Nm·s/rad or N·s/m.
     pub damping: f64,
-    /// Inertia of the quill and the wrist; the links have [`ArmInertia`].
+    /// Inertia of what turns or slides on its own; the rest is the [`Body`]'s.
     pub link_inertia: f64,
     /// Largest error of an encoder reading, evenly distributed: rad or m.
     pub encoder_noise: f64,
@@ -64,10 +66,8 @@ pub struct JointConfig {
 /// Settings of the full plant.
 #[derive(Clone, Debug)]
 pub struct FullConfig {
-    /// Geometry.
-    pub arm: ScaraArm,
-    /// Inertia of the two links.
-    pub inertia: ArmInertia,
+    /// What the joints move.
+    pub body: Body,
     /// Joints and drives.
     pub joints: [JointConfig; JOINTS],
     /// Mass that swings in the end effector's mode, kilograms.
@@ -76,7 +76,7 @@ pub struct FullConfig {
     pub mode: ModeMap,
     /// Seed of the encoders' noise.
     pub seed: u64,
-    /// Joints at the start: rad, rad, mm, rad.
+    /// Joints at the start: rad, a quill's mm.
     pub start: [f64; JOINTS],
 }
 
@@ -87,15 +87,12 @@ pub struct FullConfig {
 /// frequency by less than 0.1 %, and the number set is the number seen.
 impl Default for FullConfig {
     fn default() -> Self {
-        // Upper arm 3 kg, forearm with quill 2.5 kg, its centre 80 mm from the elbow.
-        let inertia = ArmInertia {
-            a: 0.166,
-            b: 0.040,
-            d: 0.026,
-        };
+        let inertia = ArmInertia::default();
         Self {
-            arm: ScaraArm::default(),
-            inertia,
+            body: Body::Scara {
+                arm: ScaraArm::default(),
+                inertia,
+            },
             joints: [
                 joint(Travel::Rotary, 0.080, inertia.a, 10_000.0, 150.0),
                 joint(Travel::Rotary, 0.030, inertia.d, 3_000.0, 60.0),
@@ -109,6 +106,36 @@ impl Default for FullConfig {
         }
     }
 }
+
+impl FullConfig {
+    /// A delta robot. With its motors held and its arms 20° down it resonates first at 36.6 Hz,
+    /// as [vNoorden21] has measured. The thesis gives the drives' limits at the motor and no
+    /// gear: here they are that of the SCARA's shoulder, some three times what its fastest moves
+    /// need.
+    #[must_use]
+    pub fn delta(delta: DeltaArm) -> Self {
+        let posture = [20_f64.to_radians(); JOINTS];
+        let [[own, shared, _], ..] = delta.mass_matrix(posture);
+        // Alike arms: the platform goes up and down, or to either side.
+        let heaviest = (own + 2.0 * shared).max(own - shared);
+        let stiffness = (std::f64::consts::TAU * FIRST_MODE_HZ).powi(2) * heaviest;
+        let arm = joint(Travel::Rotary, 0.5 * own, own, stiffness, 150.0);
+        Self {
+            body: Body::Delta(delta),
+            joints: [
+                arm,
+                arm,
+                arm,
+                joint(Travel::Rotary, 0.002, 0.002, 300.0, 5.0),
+            ],
+            start: posture,
+            ..Self::default()
+        }
+    }
+}
+
+/// First mode of the delta robot of [vNoorden21].
+const FIRST_MODE_HZ: f64 = 36.6;
 
 /// A joint with the drive gains of vNoorden21, scaled to this arm: its flexible
 /// joints and the slower motors bring K_p from 1100 to 200 1/s; K_v gives the bare

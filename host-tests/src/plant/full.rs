@@ -5,7 +5,7 @@
 //! | setpoints | one tick of transport, then one tick of cubic interpolation |
 //! | drive | the core's [`Servo`], 8 kHz, encoder on the motor with seeded noise |
 //! | joint | motor inertia, spring and damper, link |
-//! | links | planar two-link dynamics; quill and wrist on their own |
+//! | links | [`super::Body`]: planar two-link dynamics, quill and wrist on their own; or three arms and a platform, yaw on its own |
 //! | end effector | [`Mode`] in X and Y, rigid in Z; its mass pulls back at the arm |
 //!
 //! The mechanics run in SI units at 24 kHz (RK4). Gravity is balanced, friction
@@ -15,6 +15,7 @@ use planner_core::servo::{CYCLE_HZ, CYCLES_PER_TICK, Knot, Servo};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::body::{Accelerations, Load};
 use super::config::{FullConfig, JOINTS, JointConfig};
 use super::mode::Mode;
 
@@ -23,9 +24,6 @@ const STEPS_PER_CYCLE: u32 = 3;
 
 /// Mechanical step in seconds.
 const STEP_S: f64 = 1.0 / (CYCLE_HZ * STEPS_PER_CYCLE) as f64;
-
-/// SI units per unit of a joint: radians, and metres per millimetre.
-const SI: [f64; JOINTS] = [1.0, 1.0, 1e-3, 1.0];
 
 /// Ticks until the plant has carried out a setpoint: one of transport, one of
 /// interpolation. The output of call `k + 1` belongs to the setpoint of call `k`.
@@ -41,7 +39,7 @@ const STATES: usize = 20;
 
 type State = [f64; STATES];
 
-/// Setpoint of one tick: rad, rad, mm, rad and their derivatives.
+/// Setpoint of one tick: rad, a quill's mm, and their derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointSetpoint {
     /// Joint positions.
@@ -62,9 +60,9 @@ impl JointSetpoint {
         }
     }
 
-    fn joint(&self, i: usize, joint: &JointConfig) -> Knot {
+    fn joint(&self, i: usize, joint: &JointConfig, si: f64) -> Knot {
         Knot {
-            position: bits(joint, self.position[i] * SI[i]),
+            position: bits(joint, self.position[i] * si),
             velocity: self.velocity[i] as f32,
         }
     }
@@ -84,9 +82,9 @@ pub struct PlantOutput {
     pub tool_acceleration_mm_s2: [f64; 3],
     /// Where the tool would be without the end effector's deflection, millimetres.
     pub flange_mm: [f64; 3],
-    /// Link side of the joints: rad, rad, mm, rad.
+    /// Link side of the joints: rad, a quill's mm.
     pub joint_position: [f64; JOINTS],
-    /// Motor side of the joints, without noise: rad, rad, mm, rad.
+    /// Motor side of the joints, without noise: rad, a quill's mm.
     pub motor_position: [f64; JOINTS],
     /// Drives whose torque stands at its limit.
     pub saturated: [bool; JOINTS],
@@ -110,7 +108,8 @@ impl FullPlant {
     /// [`PlantConfig::check`](crate::plant_config::PlantConfig::check) finds them.
     #[must_use]
     pub fn new(config: FullConfig) -> Self {
-        let start: [f64; JOINTS] = std::array::from_fn(|i| config.start[i] * SI[i]);
+        let si = config.body.si();
+        let start: [f64; JOINTS] = std::array::from_fn(|i| config.start[i] * si[i]);
         let mut state = [0.0; STATES];
         state[MOTOR..LINK].copy_from_slice(&start);
         state[LINK..DEFLECTION].copy_from_slice(&start);
@@ -130,8 +129,9 @@ impl FullPlant {
     /// One control tick of 1 ms: carries out the setpoint of the last call, takes
     /// up this one, and shows the state at the end of the tick.
     pub fn step(&mut self, setpoint: JointSetpoint) -> PlantOutput {
+        let si = self.config.body.si();
         for (i, servo) in self.servos.iter_mut().enumerate() {
-            servo.latch(self.pending.joint(i, &self.config.joints[i]));
+            servo.latch(self.pending.joint(i, &self.config.joints[i], si[i]));
         }
         self.pending = setpoint;
         for cycle in 0..CYCLES_PER_TICK {
@@ -160,17 +160,18 @@ impl FullPlant {
             let (w, rate) = (s[DEFLECTION + axis], s[RATES + DEFLECTION + axis]);
             mode.acceleration(w, rate) * 1e3
         };
-        let quill = self.spring(s, 2) / self.config.joints[2].link_inertia * 1e3;
+        let si = self.config.body.si();
+        let height = self.accelerations(s, mode).flange[2] * 1e3;
         PlantOutput {
             tool_mm: [
                 flange_mm[0] + s[DEFLECTION] * 1e3,
                 flange_mm[1] + s[DEFLECTION + 1] * 1e3,
                 flange_mm[2],
             ],
-            tool_acceleration_mm_s2: [swing(0), swing(1), quill],
+            tool_acceleration_mm_s2: [swing(0), swing(1), height],
             flange_mm,
-            joint_position: std::array::from_fn(|i| s[LINK + i] / SI[i]),
-            motor_position: std::array::from_fn(|i| s[MOTOR + i] / SI[i]),
+            joint_position: std::array::from_fn(|i| s[LINK + i] / si[i]),
+            motor_position: std::array::from_fn(|i| s[MOTOR + i] / si[i]),
             saturated: std::array::from_fn(|i| self.servos[i].is_saturated()),
         }
     }
@@ -183,26 +184,30 @@ impl FullPlant {
         }
     }
 
+    /// Puts the motors elsewhere: their springs are wound then. Joints in rad, a quill's in mm.
+    #[cfg(test)]
+    pub(super) fn place_motors(&mut self, position: [f64; JOINTS]) {
+        let si = self.config.body.si();
+        for (i, position) in position.into_iter().enumerate() {
+            self.state[MOTOR + i] = position * si[i];
+        }
+    }
+
     /// Mechanical energy in joules.
     #[must_use]
     pub fn energy_j(&self) -> f64 {
         let s = &self.state;
         let rate = |i: usize| s[RATES + i];
-        let mut energy = self
-            .config
-            .inertia
-            .kinetic_j(s[LINK + 1], [rate(LINK), rate(LINK + 1)]);
+        let (q, rates) = (self.links(s), self.link_rates(s));
+        let inertia = self.link_inertia();
+        let mut energy = self.config.body.kinetic_j(q, rates, inertia);
         for (i, joint) in self.config.joints.iter().enumerate() {
             energy += 0.5 * f64::from(joint.servo.motor_inertia) * rate(MOTOR + i).powi(2);
             energy += 0.5 * joint.stiffness * (s[MOTOR + i] - s[LINK + i]).powi(2);
-            if i >= 2 {
-                energy += 0.5 * joint.link_inertia * rate(LINK + i).powi(2);
-            }
         }
-        let jacobian = self.config.arm.jacobian(self.links(s));
         let omega = self.mode().omega();
-        for (axis, row) in jacobian.iter().enumerate() {
-            let flange = 1e-3 * (row[0] * rate(LINK) + row[1] * rate(LINK + 1));
+        let flange = self.config.body.flange_velocity(q, rates);
+        for (axis, flange) in flange.into_iter().enumerate() {
             let speed = flange + rate(DEFLECTION + axis);
             let swing = omega * s[DEFLECTION + axis];
             energy += 0.5 * self.config.tool_mass_kg * (speed * speed + swing * swing);
@@ -211,7 +216,7 @@ impl FullPlant {
     }
 
     fn flange_mm(&self) -> [f64; 3] {
-        let pose = self.config.arm.forward(self.links(&self.state));
+        let pose = self.config.body.forward(self.links(&self.state));
         [pose[0], pose[1], pose[2]]
     }
 
@@ -219,9 +224,36 @@ impl FullPlant {
         self.config.mode.at(self.flange_mm())
     }
 
-    /// Link side of the joints in rad, rad, mm, rad.
+    /// Link side of the joints in rad, a quill's in mm.
     fn links(&self, s: &State) -> [f64; JOINTS] {
-        std::array::from_fn(|i| s[LINK + i] / SI[i])
+        let si = self.config.body.si();
+        std::array::from_fn(|i| s[LINK + i] / si[i])
+    }
+
+    /// Rates of the same in SI units.
+    fn link_rates(&self, s: &State) -> [f64; JOINTS] {
+        std::array::from_fn(|i| s[RATES + LINK + i])
+    }
+
+    fn link_inertia(&self) -> [f64; JOINTS] {
+        std::array::from_fn(|i| self.config.joints[i].link_inertia)
+    }
+
+    /// Accelerations of what the joints' springs and the swinging mass pull at.
+    fn accelerations(&self, s: &State, mode: Mode) -> Accelerations {
+        // The swinging mass accelerates by ÿ and pulls back with −m ÿ.
+        let pull = std::array::from_fn(|axis| {
+            let (w, rate) = (s[DEFLECTION + axis], s[RATES + DEFLECTION + axis]);
+            -self.config.tool_mass_kg * mode.acceleration(w, rate)
+        });
+        let load = Load {
+            torque: std::array::from_fn(|i| self.spring(s, i)),
+            inertia: self.link_inertia(),
+            pull,
+        };
+        self.config
+            .body
+            .accelerations(self.links(s), self.link_rates(s), &load)
     }
 
     /// Torque that joint `i` passes from motor to link.
@@ -235,29 +267,15 @@ impl FullPlant {
         let config = &self.config;
         let mut d = [0.0; STATES];
         d[..RATES].copy_from_slice(&s[RATES..]);
-        let spring: [f64; JOINTS] = std::array::from_fn(|i| self.spring(s, i));
         for (i, joint) in config.joints.iter().enumerate() {
-            d[RATES + MOTOR + i] = (torque[i] - spring[i]) / f64::from(joint.servo.motor_inertia);
-            d[RATES + LINK + i] = spring[i] / joint.link_inertia;
+            d[RATES + MOTOR + i] =
+                (torque[i] - self.spring(s, i)) / f64::from(joint.servo.motor_inertia);
         }
-        // The swinging mass accelerates by ÿ and pulls back with −m ÿ.
-        let swing: [f64; 2] = std::array::from_fn(|axis| {
-            mode.acceleration(s[DEFLECTION + axis], s[RATES + DEFLECTION + axis])
-        });
-        let q = self.links(s);
-        let jacobian = config.arm.jacobian(q);
-        let load = |joint: usize| {
-            let lever = jacobian[0][joint] * swing[0] + jacobian[1][joint] * swing[1];
-            spring[joint] - config.tool_mass_kg * 1e-3 * lever
-        };
-        let rates = [s[RATES + LINK], s[RATES + LINK + 1]];
-        let links = config
-            .inertia
-            .acceleration(s[LINK + 1], rates, [load(0), load(1)]);
-        let flange = config.arm.tool_acceleration(q, rates, links);
+        let moving = self.accelerations(s, mode);
+        d[RATES + LINK..RATES + LINK + JOINTS].copy_from_slice(&moving.joints);
         for axis in 0..2 {
-            d[RATES + LINK + axis] = links[axis];
-            d[RATES + DEFLECTION + axis] = swing[axis] - flange[axis] * 1e-3;
+            let swing = mode.acceleration(s[DEFLECTION + axis], s[RATES + DEFLECTION + axis]);
+            d[RATES + DEFLECTION + axis] = swing - moving.flange[axis];
         }
         d
     }

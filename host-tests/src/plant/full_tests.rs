@@ -2,7 +2,7 @@
 
 use super::config::{FullConfig, JOINTS, ModeMap};
 use super::full::{FullPlant, JointSetpoint, LATENCY_TICKS, PlantOutput};
-use super::{Elbow, Mode};
+use super::{Body, DeltaArm, Elbow, Mode, ScaraArm};
 use crate::oracle::{Path, Prefilter, path::corner_path};
 use crate::vector::{distance, xyz};
 use crate::vibration::{Vibration, moving_samples};
@@ -97,7 +97,7 @@ fn end_effector_follows_the_pose_map() {
             tool_mass_kg: 1e-9,
             ..FullConfig::default()
         };
-        let (start, arm) = (config.start, config.arm);
+        let (start, body) = (config.start, config.body);
         let mut plant = FullPlant::new(config);
         plant.pluck([1.0, 0.0]);
         let record = hold(&mut plant, start, 2000);
@@ -105,7 +105,7 @@ fn end_effector_follows_the_pose_map() {
             .iter()
             .map(|o| o.tool_acceleration_mm_s2[0])
             .collect();
-        let expected = arm.forward(start)[0] / 20.0;
+        let expected = body.forward(start)[0] / 20.0;
         assert!((identify(&signal).0 / expected - 1.0).abs() < 1e-3);
     }
 }
@@ -227,7 +227,7 @@ fn corner_path_run(name: &str, config: FullConfig) -> (Vibration, f64) {
     let filter = Prefilter::named(name, 6.34, 0.022).unwrap();
     let path = Path::uniform(&corner_path(), 160.0, &filter, 0.5);
     let schedule = path.schedule();
-    let arm = config.arm;
+    let arm = ScaraArm::default();
     let command = schedule.sample(TICK_S, 3.0);
     let setpoints: Vec<_> = command
         .iter()
@@ -304,4 +304,106 @@ fn what_rings_after_a_stop_is_the_end_effector() {
         assert!((frequency / 6.34 - 1.0).abs() < 5e-3, "{frequency}");
         assert!((damping - 0.022).abs() < 2e-3, "{damping}");
     }
+}
+
+/// A delta in the middle of its workspace.
+fn delta() -> FullConfig {
+    let arm = DeltaArm::default();
+    FullConfig {
+        start: arm.inverse([0.0, 0.0, -767.0, 0.0]).unwrap(),
+        ..FullConfig::delta(arm)
+    }
+}
+
+#[test]
+fn a_delta_without_damping_and_drives_keeps_its_energy() {
+    let mut config = FullConfig {
+        tool_mass_kg: 0.5,
+        mode: ModeMap::constant(Mode {
+            frequency_hz: 6.34,
+            damping: 0.0,
+        }),
+        ..delta()
+    };
+    for joint in &mut config.joints {
+        joint.damping = 0.0;
+        joint.servo.torque_limit = 0.0;
+    }
+    let start = config.start;
+    let mut plant = FullPlant::new(config);
+    plant.pluck([30.0, -20.0]);
+    let energy = plant.energy_j();
+    for _ in 0..2000 {
+        plant.step(JointSetpoint::at_rest(start));
+        let ratio = plant.energy_j() / energy;
+        assert!((ratio - 1.0).abs() < 1e-5, "{ratio}");
+    }
+    let moved = distance(plant.output().flange_mm, [0.0, 0.0, -767.0]);
+    assert!(moved > 0.1, "{moved} mm");
+}
+
+#[test]
+fn a_deltas_first_mode_is_where_the_thesis_measured_it() {
+    // Motors that hold still: heavy, and without drives.
+    let mut config = FullConfig {
+        tool_mass_kg: 1e-9,
+        ..delta()
+    };
+    for joint in &mut config.joints {
+        joint.servo.motor_inertia = 1e4;
+        joint.servo.torque_limit = 0.0;
+    }
+    let start = config.start;
+    // All arms a little off: the platform goes up and down.
+    let mut shifted = config.clone();
+    for joint in 0..3 {
+        shifted.start[joint] += 1e-3;
+    }
+    let body = config.body;
+    let mut plant = FullPlant::new(shifted);
+    plant.place_motors(start);
+    let height: Vec<f64> = hold(&mut plant, start, 400)
+        .iter()
+        .map(|out| out.flange_mm[2] - body.forward(start)[2])
+        .collect();
+    let (vertical, damping) = identify(&height);
+    // 36.6 Hz ± 13 % over the robots measured
+    assert!((32.0..42.0).contains(&vertical), "{vertical}");
+    assert!((0.01..0.1).contains(&damping), "{damping}");
+}
+
+#[test]
+fn a_delta_follows_across_its_workspace() {
+    let config = delta();
+    let Body::Delta(arm) = config.body else {
+        panic!("a delta");
+    };
+    // 400 mm and 60 mm up in 0.6 s, as a cosine.
+    let place = |k: u32| {
+        let phase = (f64::from(k.min(600)) / 600.0 * std::f64::consts::PI).cos();
+        [200.0 * -phase, 0.0, -737.0 - 30.0 * phase, 0.0]
+    };
+    let joints = |k: u32| arm.inverse(place(k)).unwrap();
+    let mut plant = FullPlant::new(FullConfig {
+        start: joints(0),
+        ..config
+    });
+    let mut miss = 0.0_f64;
+    for k in 0..1000 {
+        let (before, now, after) = (joints(k.max(1) - 1), joints(k), joints(k + 1));
+        let half = |i: usize| (after[i] - before[i]) / (2.0 * TICK_S);
+        let bend = |i: usize| (after[i] - 2.0 * now[i] + before[i]) / (TICK_S * TICK_S);
+        let out = plant.step(JointSetpoint {
+            position: now,
+            velocity: std::array::from_fn(half),
+            acceleration: std::array::from_fn(bend),
+        });
+        assert_eq!(out.saturated, [false; JOINTS]);
+        if k > 0 {
+            miss = miss.max(distance(out.flange_mm, xyz(place(k - 1))));
+        }
+    }
+    assert!(miss < 0.5, "{miss} mm");
+    let end = plant.output();
+    assert!(distance(end.flange_mm, xyz(place(600))) < 0.01);
 }

@@ -4,7 +4,9 @@
 //! accelerometer there reads it ([`crate::vibration`]).
 
 pub mod arm;
+pub mod body;
 pub mod config;
+pub mod delta_arm;
 pub mod full;
 pub mod ideal;
 pub mod mode;
@@ -14,7 +16,9 @@ pub mod travelling;
 mod full_tests;
 
 pub use arm::{Elbow, ScaraArm};
+pub use body::Body;
 pub use config::{FullConfig, ModeMap};
+pub use delta_arm::DeltaArm;
 pub use full::{FullPlant, JointSetpoint, PlantOutput};
 pub use ideal::{IdealOutput, IdealPlant};
 pub use mode::Mode;

@@ -1,6 +1,7 @@
 //! The seam between the robots: which arm it is, and what planning and the tick ask of it.
 
 use super::config::Elbow;
+use super::delta::Delta;
 use super::pose_check::PoseError;
 use super::scara::Scara;
 use super::segment_check::{Curve, SegmentError};
@@ -12,6 +13,8 @@ pub enum ArmKind {
     /// Two links, a quill and a wrist.
     #[default]
     Scara,
+    /// Three arms on a base, and yaw.
+    Delta,
 }
 
 impl ArmKind {
@@ -25,6 +28,7 @@ impl ArmKind {
                 JointUnit::Length,
                 JointUnit::Angle,
             ],
+            Self::Delta => [JointUnit::Angle; AXES],
         }
     }
 }
@@ -36,6 +40,8 @@ impl ArmKind {
 pub enum Arm {
     /// A SCARA.
     Scara(Scara),
+    /// A delta robot.
+    Delta(Delta),
 }
 
 impl Arm {
@@ -44,19 +50,21 @@ impl Arm {
     pub const fn kind(&self) -> ArmKind {
         match self {
             Self::Scara(_) => ArmKind::Scara,
+            Self::Delta(_) => ArmKind::Delta,
         }
     }
 
-    /// Joint positions at a pose: [`Scara::inverse`].
+    /// Joint positions at a pose: [`Scara::inverse`], [`Delta::inverse`].
     #[must_use]
     pub fn inverse(&self, pose: &Pose) -> JointPosition {
         match self {
             Self::Scara(scara) => scara.inverse(pose),
+            Self::Delta(delta) => delta.inverse(pose),
         }
     }
 
     /// Positions, velocities and accelerations of the joints for a moving tool:
-    /// [`Scara::joint_state`].
+    /// [`Scara::joint_state`], [`Delta::joint_state`].
     #[must_use]
     pub fn joint_state(
         &self,
@@ -66,42 +74,47 @@ impl Arm {
     ) -> JointState {
         match self {
             Self::Scara(scara) => scara.joint_state(pose, velocity, acceleration),
+            Self::Delta(delta) => delta.joint_state(pose, velocity, acceleration),
         }
     }
 
-    /// Where the tool is with the joints at `joints`: [`Scara::forward`].
+    /// Where the tool is with the joints at `joints`: [`Scara::forward`], [`Delta::forward`].
     #[must_use]
     pub fn forward(&self, joints: &JointPosition) -> Pose {
         match self {
             Self::Scara(scara) => scara.forward(joints),
+            Self::Delta(delta) => delta.forward(joints),
         }
     }
 
-    /// Change of the pose per change of each joint: [`Scara::jacobian`].
+    /// Change of the pose per change of each joint: [`Scara::jacobian`], [`Delta::jacobian`].
     #[must_use]
     pub fn jacobian(&self, joints: &JointPosition) -> [[f32; AXES]; AXES] {
         match self {
             Self::Scara(scara) => scara.jacobian(joints),
+            Self::Delta(delta) => delta.jacobian(joints),
         }
     }
 
-    /// The joints at `pose`, if all limits hold there: [`Scara::check`].
+    /// The joints at `pose`, if all limits hold there: [`Scara::check`], [`Delta::check`].
     ///
     /// # Errors
     /// The first limit that does not hold.
     pub fn check(&self, pose: &Pose) -> Result<JointPosition, PoseError> {
         match self {
             Self::Scara(scara) => scara.check(pose),
+            Self::Delta(delta) => delta.check(pose),
         }
     }
 
-    /// Checks every pose of a segment against all limits: [`Scara::check_segment`].
+    /// Checks every pose of a segment against all limits: [`Scara::check_segment`], [`Delta::check_segment`].
     ///
     /// # Errors
     /// The first violation found and where it is.
     pub fn check_segment(&self, curve: &impl Curve) -> Result<(), SegmentError> {
         match self {
             Self::Scara(scara) => scara.check_segment(curve),
+            Self::Delta(delta) => delta.check_segment(curve),
         }
     }
 
@@ -109,6 +122,7 @@ impl Arm {
     pub fn set_elbow(&mut self, elbow: Elbow) {
         match self {
             Self::Scara(scara) => scara.set_elbow(elbow),
+            Self::Delta(_) => {}
         }
     }
 
@@ -117,6 +131,7 @@ impl Arm {
     pub fn elbow_at(&self, joints: &JointPosition) -> Option<Elbow> {
         match self {
             Self::Scara(_) => Some(Elbow::of(joints.joint2)),
+            Self::Delta(_) => None,
         }
     }
 }

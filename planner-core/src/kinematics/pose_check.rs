@@ -1,7 +1,7 @@
 //! Whether the arm can take a pose.
 
 use super::scara::{HALF_TURN, MM_PER_LSB, RAD_PER_LSB, Scara, squared_radius};
-use crate::pose::{JointPosition, Pose};
+use crate::pose::{JointPosition, JointUnit, Pose};
 use core::{f32::consts::PI, fmt};
 
 /// Why a pose cannot be used.
@@ -23,16 +23,45 @@ pub enum PoseError {
         /// What it must keep from 0° and 180°.
         margin_deg: f32,
     },
+    /// A delta's arm would not reach the platform.
+    ArmUnreachable {
+        /// 1 to 3.
+        arm: u8,
+        /// Distance of the platform from the shoulder in the arm's plane.
+        distance_mm: f32,
+        /// Closest distance that the arm reaches there.
+        min_mm: f32,
+        /// Furthest distance that the arm reaches there.
+        max_mm: f32,
+    },
+    /// A delta's forearm would nearly lie in the plane of its upper arm and its shoulder's axis.
+    NearSerial {
+        /// 1 to 3.
+        arm: u8,
+        /// Its angle to that plane.
+        angle_deg: f32,
+        /// What it must keep.
+        margin_deg: f32,
+    },
+    /// A delta's three forearms would nearly lie in one plane.
+    NearParallel {
+        /// The volume that their directions span; 1 at right angles.
+        volume: f32,
+        /// What it must be.
+        margin: f32,
+    },
     /// A joint would be beyond its travel.
     JointLimit {
         /// 1 to 4.
         joint: u8,
-        /// Its position at this pose: degrees, or millimetres for joint 3.
+        /// Its position at this pose in ° or mm.
         value: f32,
         /// Its lowest position, in the same unit.
         min: f32,
         /// Its highest position, in the same unit.
         max: f32,
+        /// Which unit that is.
+        unit: JointUnit,
     },
 }
 
@@ -54,13 +83,35 @@ impl fmt::Display for PoseError {
                 f,
                 "the elbow would be at {joint2_deg:.3}°, within {margin_deg:.3}° of stretched or folded"
             ),
+            Self::ArmUnreachable {
+                arm,
+                distance_mm,
+                min_mm,
+                max_mm,
+            } => write!(
+                f,
+                "the platform would be {distance_mm:.3} mm from the shoulder of arm {arm}, which reaches from {min_mm:.3} to {max_mm:.3} mm there"
+            ),
+            Self::NearSerial {
+                arm,
+                angle_deg,
+                margin_deg,
+            } => write!(
+                f,
+                "the forearm of arm {arm} would be {angle_deg:.3}° from the plane of its upper arm, closer than {margin_deg:.3}°"
+            ),
+            Self::NearParallel { volume, margin } => write!(
+                f,
+                "the forearms would nearly lie in one plane: they would span {volume:.4}, less than {margin:.4}"
+            ),
             Self::JointLimit {
                 joint,
                 value,
                 min,
                 max,
+                unit,
             } => {
-                let unit = if joint == 3 { " mm" } else { "°" };
+                let unit = unit.sign();
                 write!(
                     f,
                     "joint {joint} would be at {value:.3}{unit}, its travel is {min:.3} to {max:.3}{unit}"
@@ -110,16 +161,32 @@ impl Scara {
             .get(usize::from(joint).wrapping_sub(1))
             .copied()
             .unwrap_or_default();
-        let unit = |bits: i32| match joint {
-            3 => bits as f32 * MM_PER_LSB,
-            _ => degrees(bits),
+        let unit = if joint == 3 {
+            JointUnit::Length
+        } else {
+            JointUnit::Angle
         };
-        PoseError::JointLimit {
-            joint,
-            value: unit(value),
-            min: unit(min),
-            max: unit(max),
-        }
+        joint_limit(joint, value, (min, max), unit)
+    }
+}
+
+/// Joint `joint` (1 to 4) at `value` is beyond its travel.
+pub(super) fn joint_limit(
+    joint: u8,
+    value: i32,
+    (min, max): (i32, i32),
+    unit: JointUnit,
+) -> PoseError {
+    let shown = |bits: i32| match unit {
+        JointUnit::Angle => degrees(bits),
+        JointUnit::Length => bits as f32 * MM_PER_LSB,
+    };
+    PoseError::JointLimit {
+        joint,
+        value: shown(value),
+        min: shown(min),
+        max: shown(max),
+        unit,
     }
 }
 

@@ -16,13 +16,13 @@ const RAD_PER_DEG_Q29: i64 = 1_199_381_129;
 /// 32 rad in AngleDeg, rounded down: the furthest that an AngleRad holds.
 const DEG_OF_32_RAD: i32 = 961_263_668;
 /// `180/π` from AngleRad to AngleDeg, Q31.
-const DEG_PER_RAD_Q31: i64 = 961_263_669;
+pub(super) const DEG_PER_RAD_Q31: i64 = 961_263_669;
 /// One turn and half a turn in AngleRad.
 pub(super) const TURN: i32 = 421_657_428;
 pub(super) const HALF_TURN: i32 = 210_828_714;
 
 /// Degrees to radians, of rates.
-const RAD_S_PER_DEG_S: f32 = 0.017_453_292;
+pub(super) const RAD_S_PER_DEG_S: f32 = 0.017_453_292;
 /// LengthMm, AngleRad and Q30 to plain numbers.
 pub(super) const MM_PER_LSB: f32 = 1.0 / 524_288.0;
 pub(super) const RAD_PER_LSB: f32 = 1.0 / 67_108_864.0;
@@ -353,7 +353,7 @@ pub(super) fn squared_radius(pose: &Pose) -> u64 {
 }
 
 /// `length · factor` for a factor in Q30, rounded to nearest.
-fn scale_q30(length: i32, factor: i32) -> i32 {
+pub(super) fn scale_q30(length: i32, factor: i32) -> i32 {
     ((i64::from(length) * i64::from(factor) + (1 << 29)) >> 30) as i32
 }
 
@@ -363,18 +363,18 @@ const fn round_shift_3(angle_q29: i32) -> i32 {
 }
 
 /// Degrees to AngleRad bits, rounded to nearest; saturates at ±32 rad.
-fn radians(angle: AngleDeg) -> i32 {
+pub(super) fn radians(angle: AngleDeg) -> i32 {
     let within = angle.to_bits().clamp(-DEG_OF_32_RAD, DEG_OF_32_RAD);
     ((i64::from(within) * RAD_PER_DEG_Q29 + (1 << 28)) >> 29) as i32
 }
 
 /// The low half of `value >> by`, for `by` from 1 to 31: three instructions where a shift of a
 /// 64-bit number by any amount takes eight.
-fn shift_right(value: i64, by: u32) -> i32 {
+pub(super) fn shift_right(value: i64, by: u32) -> i32 {
     let (high, low) = ((value >> 32) as u32, value as u32);
     (low.wrapping_shr(by) | high.wrapping_shl(32_u32.wrapping_sub(by))) as i32
 }
 
-fn saturate(value: i64) -> i32 {
+pub(super) fn saturate(value: i64) -> i32 {
     value.max(i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32
 }

@@ -108,25 +108,15 @@ impl Scara {
     pub fn check_segment(&self, curve: &impl Curve) -> Result<(), SegmentError> {
         let bounds = self.bounds();
         let travel = curve.travel();
-        let fastest = travel.xy_mm.max(travel.z_mm).max(travel.c_deg);
-        let step_min = (STEP_MIN / fastest).max(FRACTION_MIN);
-
-        let mut fraction = 0.0;
         let mut before: Option<JointPosition> = None;
-        loop {
-            let at = |cause| SegmentError { fraction, cause };
-            let pose = pose_from_f64(curve.pose(fraction));
-            let joints = self.check(&pose).map_err(at)?;
+        walk(curve, &travel, |pose| {
+            let joints = self.check(pose)?;
             if let Some(before) = before {
-                self.check_seam(before.joint1, joints.joint1).map_err(at)?;
-            }
-            if fraction >= 1.0 {
-                return Ok(());
+                self.check_seam(before.joint1, joints.joint1)?;
             }
             before = Some(joints);
-            let step = self.clear_fraction(&bounds, &travel, &pose, &joints);
-            fraction = (fraction + f64::from(step.max(step_min))).min(1.0);
-        }
+            Ok(self.clear_fraction(&bounds, &travel, pose, &joints))
+        })
     }
 
     /// The fraction of the segment over which no limit can be reached from here.
@@ -200,8 +190,28 @@ impl Scara {
     }
 }
 
+/// Walks along a segment: `clear` checks a pose and tells over which fraction of the segment no
+/// limit can be reached from there.
+pub(super) fn walk(
+    curve: &impl Curve,
+    travel: &Travel,
+    mut clear: impl FnMut(&Pose) -> Result<f32, PoseError>,
+) -> Result<(), SegmentError> {
+    let fastest = travel.xy_mm.max(travel.z_mm).max(travel.c_deg);
+    let step_min = (STEP_MIN / fastest).max(FRACTION_MIN);
+    let mut fraction = 0.0;
+    loop {
+        let pose = pose_from_f64(curve.pose(fraction));
+        let step = clear(&pose).map_err(|cause| SegmentError { fraction, cause })?;
+        if fraction >= 1.0 {
+            return Ok(());
+        }
+        fraction = (fraction + f64::from(step.max(step_min))).min(1.0);
+    }
+}
+
 /// Distance to the nearer limit.
-fn margin(value: i32, (min, max): (i32, i32)) -> f32 {
+pub(super) fn margin(value: i32, (min, max): (i32, i32)) -> f32 {
     value.saturating_sub(min).min(max.saturating_sub(value)) as f32
 }
 

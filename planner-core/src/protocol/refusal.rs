@@ -59,7 +59,7 @@ impl fmt::Display for Refusal {
 }
 
 /// What each `error:N` means, as `$EE` lists it.
-pub const ERRORS: [(u8, &str); 50] = [
+pub const ERRORS: [(u8, &str); 51] = [
     (1, "A word begins with something other than a letter"),
     (2, "A letter has no proper number"),
     (3, "There is no such $ command or setting: see $ and $$"),
@@ -148,6 +148,7 @@ pub const ERRORS: [(u8, &str); 50] = [
         78,
         "The settings do not make a robot: see the message before",
     ),
+    (79, "This robot has no elbow: leave out M101 and M102"),
     (80, "G64 takes either P in mm or Q of 0 to 100 percent"),
 ];
 

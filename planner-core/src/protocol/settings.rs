@@ -136,6 +136,7 @@ const fn decimal(low: f32, high: f32) -> Kind {
 const JOINTS: &[&str] = &["Joint 1", "Joint 2", "Joint 3", "Joint 4"];
 const INPUTS: &[&str] = &["Joint 1", "Joint 2", "Joint 3", "Joint 4", "Door"];
 const ELBOWS: &[&str] = &["left", "right"];
+const ROBOTS: &[&str] = &["scara", "delta"];
 const PREFILTERS: &[&str] = &{
     let mut names = [""; Prefilter::ALL.len()];
     let mut i = 0;
@@ -147,7 +148,7 @@ const PREFILTERS: &[&str] = &{
 };
 
 /// The table, by number.
-pub const SETTINGS: [Setting; 58] = [
+pub const SETTINGS: [Setting; 69] = [
     setting(
         5,
         "inputs-inverted",
@@ -277,6 +278,14 @@ pub const SETTINGS: [Setting; 58] = [
         Kind::Bits(JOINTS),
     ),
     setting(
+        1009,
+        "robot",
+        ROBOT,
+        "Kind of robot",
+        "",
+        Kind::Choice(ROBOTS),
+    ),
+    setting(
         1010,
         "link1",
         ROBOT,
@@ -379,7 +388,7 @@ pub const SETTINGS: [Setting; 58] = [
         "home3",
         HOMING,
         "Joint 3 at its limit input",
-        "mm",
+        "mm or deg",
         decimal(-4000.0, 4000.0),
     ),
     setting(
@@ -597,6 +606,86 @@ pub const SETTINGS: [Setting; 58] = [
         "Time of impulse 5 of custom",
         "ms",
         decimal(0.0, 1000.0),
+    ),
+    setting(
+        1110,
+        "delta-base",
+        ROBOT,
+        "Delta's base radius",
+        "mm",
+        decimal(0.0, 2000.0),
+    ),
+    setting(
+        1111,
+        "delta-platform",
+        ROBOT,
+        "Delta's platform radius",
+        "mm",
+        decimal(0.0, 2000.0),
+    ),
+    setting(
+        1112,
+        "delta-upper-arm",
+        ROBOT,
+        "Delta's upper arm",
+        "mm",
+        decimal(10.0, 1990.0),
+    ),
+    setting(
+        1113,
+        "delta-forearm",
+        ROBOT,
+        "Delta's forearm",
+        "mm",
+        decimal(10.0, 1990.0),
+    ),
+    setting(
+        1114,
+        "delta-arm-min",
+        ROBOT,
+        "Delta's arms lower limit",
+        "deg",
+        decimal(-170.0, 170.0),
+    ),
+    setting(
+        1115,
+        "delta-arm-max",
+        ROBOT,
+        "Delta's arms upper limit",
+        "deg",
+        decimal(-170.0, 170.0),
+    ),
+    setting(
+        1116,
+        "delta-yaw-min",
+        ROBOT,
+        "Delta's yaw lower limit",
+        "deg",
+        decimal(-1080.0, 1080.0),
+    ),
+    setting(
+        1117,
+        "delta-yaw-max",
+        ROBOT,
+        "Delta's yaw upper limit",
+        "deg",
+        decimal(-1080.0, 1080.0),
+    ),
+    setting(
+        1118,
+        "delta-serial-margin",
+        ROBOT,
+        "Delta's forearms from their arms' planes",
+        "deg",
+        decimal(0.5, 45.0),
+    ),
+    setting(
+        1119,
+        "delta-parallel-margin",
+        ROBOT,
+        "Volume that the delta's forearms span",
+        "",
+        decimal(0.01, 0.5),
     ),
 ];
 
