@@ -3,6 +3,7 @@
 use core::fmt;
 
 use crate::corner::CornerRule;
+use crate::hop::{HopAxes, HopConfig, HopError};
 use crate::kinematics::{
     Arm, ArmKind, Delta, DeltaConfig, DeltaError, Elbow, JointRange, Scara, ScaraConfig, ScaraError,
 };
@@ -38,6 +39,8 @@ pub struct RobotConfig {
     pub yaw_limit_deg_s: f32,
     /// Speed of joints 1, 2 and 4 while the elbow changes its side, in °/s, above 0 to 10 000.
     pub joint_speed_deg_s: f32,
+    /// How pick-and-place moves go where the program does not say.
+    pub hop: HopConfig,
 }
 
 impl Default for RobotConfig {
@@ -55,6 +58,7 @@ impl Default for RobotConfig {
             feed_limit_mm_s: 1000.0,
             yaw_limit_deg_s: 360.0,
             joint_speed_deg_s: 90.0,
+            hop: HopConfig::default(),
         }
     }
 }
@@ -70,6 +74,8 @@ pub enum ConfigError {
     Prefilter(PrefilterError),
     /// The map of the mode, or the prefilters that follow it.
     Follow(FollowError),
+    /// Pick-and-place moves.
+    Hop(HopError),
     /// A plain number is out of its range.
     Range {
         /// Name of the setting.
@@ -101,6 +107,12 @@ impl From<PrefilterError> for ConfigError {
     }
 }
 
+impl From<HopError> for ConfigError {
+    fn from(error: HopError) -> Self {
+        Self::Hop(error)
+    }
+}
+
 impl fmt::Display for ConfigError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -108,6 +120,7 @@ impl fmt::Display for ConfigError {
             Self::Delta(error) => error.fmt(f),
             Self::Prefilter(error) => error.fmt(f),
             Self::Follow(error) => error.fmt(f),
+            Self::Hop(error) => error.fmt(f),
             Self::Range {
                 name,
                 value,
@@ -168,6 +181,7 @@ impl Robot {
                 });
             }
         }
+        config.hop.check()?;
         let follower = follower(config)?;
         let tuning = first_tuning(config, follower.as_ref());
         let prefilter = tuning.prefilter()?;
@@ -269,6 +283,7 @@ enum Slot<'a> {
     Prefilter(&'a mut Kind),
     Elbow(&'a mut Elbow),
     Arm(&'a mut ArmKind),
+    HopAxes(&'a mut HopAxes),
 }
 
 /// The value of a setting, as text shows it.
@@ -303,7 +318,7 @@ impl RobotConfig {
 
     /// Names of all settings, in groups whose values must fit each other: lengths in mm, angles
     /// in °, the frequency in Hz, feedrates in mm/s, the yaw limit in °/s.
-    pub const GROUPS: [&'static [&'static str]; 17] = [
+    pub const GROUPS: [&'static [&'static str]; 21] = [
         &[
             "robot",
             "delta-base",
@@ -347,6 +362,10 @@ impl RobotConfig {
         &["feed-limit"],
         &["yaw-limit"],
         &["joint-speed"],
+        &["hop-height", "hop-rise"],
+        &["hop-tolerance"],
+        &["hop-acceleration"],
+        &["hop-axes"],
     ];
 
     /// Travels of joints 1 to 4 in ° or mm.
@@ -390,6 +409,7 @@ impl RobotConfig {
             Slot::Prefilter(kind) => *kind = Kind::from_name(value).ok_or(SettingError::Value)?,
             Slot::Elbow(elbow) => *elbow = named(&ELBOWS, value).ok_or(SettingError::Value)?,
             Slot::Arm(arm) => *arm = named(&ARMS, value).ok_or(SettingError::Value)?,
+            Slot::HopAxes(axes) => *axes = HopAxes::from_name(value).ok_or(SettingError::Value)?,
         }
         Ok(())
     }
@@ -410,6 +430,9 @@ impl RobotConfig {
             Some(Slot::Arm(arm)) => {
                 *arm = ARMS.get(value as usize).map_or(*arm, |(_, arm)| *arm);
             }
+            Some(Slot::HopAxes(axes)) => {
+                *axes = HopAxes::ALL.get(value as usize).copied().unwrap_or(*axes);
+            }
             None => {}
         }
     }
@@ -423,6 +446,7 @@ impl RobotConfig {
             Slot::Prefilter(kind) => SettingValue::Name(kind.name()),
             Slot::Elbow(elbow) => SettingValue::Name(name_of(&ELBOWS, elbow)),
             Slot::Arm(arm) => SettingValue::Name(name_of(&ARMS, arm)),
+            Slot::HopAxes(axes) => SettingValue::Name(axes.name()),
         })
     }
 
@@ -482,6 +506,11 @@ impl RobotConfig {
             "rapid" => Slot::Number(&mut self.rapid_mm_s),
             "feed-limit" => Slot::Number(&mut self.feed_limit_mm_s),
             "yaw-limit" => Slot::Number(&mut self.yaw_limit_deg_s),
+            "hop-height" => Slot::Number(&mut self.hop.height_mm),
+            "hop-rise" => Slot::Number(&mut self.hop.rise_mm),
+            "hop-tolerance" => Slot::Number(&mut self.hop.tolerance_mm),
+            "hop-acceleration" => Slot::Number(&mut self.hop.acceleration_mm_s2),
+            "hop-axes" => Slot::HopAxes(&mut self.hop.axes),
             "joint-speed" => Slot::Number(&mut self.joint_speed_deg_s),
             _ => return None,
         })

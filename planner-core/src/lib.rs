@@ -9,6 +9,7 @@ mod changeover;
 pub mod config;
 pub mod corner;
 pub mod gcode;
+pub mod hop;
 pub mod joint_space;
 pub mod kinematics;
 pub mod math;

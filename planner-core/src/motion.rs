@@ -389,6 +389,7 @@ impl<'q> Motion<'q> {
         let kernel = self.changeover.kernel();
         let raw = self.walker.step(kernel, may_begin);
         let (chord, moved, changes_over) = (raw.chord, raw.moved, raw.changes_over);
+        let direct = raw.direct;
         let [bow_x, bow_y] = self.arcs.step(&mut self.filters.arcs, kernel, &raw);
         let line = self.changeover.step(&mut self.filters.lines, chord);
         if changes_over {
@@ -409,7 +410,13 @@ impl<'q> Motion<'q> {
             self.come_to_rest();
             return self.history[1];
         }
-        let [x, y, z, c] = line;
+        let mut newest = line;
+        for ((value, chord), is_direct) in newest.iter_mut().zip(chord).zip(direct) {
+            if is_direct {
+                *value = i64::from(chord) << FINE_BITS;
+            }
+        }
+        let [x, y, z, c] = newest;
         [x.wrapping_add(bow_x), y.wrapping_add(bow_y), z, c]
     }
 

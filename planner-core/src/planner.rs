@@ -4,9 +4,10 @@ use core::fmt;
 
 use crate::config::{ConfigError, Robot};
 use crate::gcode::{
-    self, Command, Defaults, Feed, Interpreted, Interpreter, Line, MAX_ACTIONS_A_LINE, Move,
-    Offsets, ProgramFlow, RobotChange,
+    self, Command, Defaults, Feed, HopMove, Interpreted, Interpreter, Line, MAX_ACTIONS_A_LINE,
+    Move, Offsets, ProgramFlow, RobotChange,
 };
+use crate::hop::{self, Hop, HopConfig, HopError, HopLimits};
 use crate::kinematics::{Arm, Elbow, PoseError, SegmentError};
 use crate::path::{PathSegment, Shape};
 use crate::pose::{JointPosition, Pose};
@@ -56,6 +57,8 @@ pub enum Cause {
     Prefilter(ConfigError),
     /// M100 gives a mode of its own although there is a map.
     MapSaysMode,
+    /// The pick-and-place move of M103.
+    Hop(HopError),
     /// The segment would take more than a day.
     TooSlow {
         /// How long it would take.
@@ -85,6 +88,7 @@ impl LineError {
             Cause::Full => 74,
             Cause::Prefilter(_) | Cause::MapSaysMode => 76,
             Cause::NoElbow => 79,
+            Cause::Hop(_) => 77,
         }
     }
 }
@@ -105,6 +109,7 @@ impl fmt::Display for LineError {
             Cause::Pose(error) => error.fmt(f),
             Cause::Segment(error) | Cause::Jog(error) => error.fmt(f),
             Cause::Prefilter(error) => error.fmt(f),
+            Cause::Hop(error) => error.fmt(f),
             Cause::TooSlow { duration_s } => write!(
                 f,
                 "the segment would take {duration_s:.0} s, more than a day: give a higher feedrate"
@@ -372,6 +377,10 @@ impl<'q> Planner<'q> {
                 folded = change.as_ref().map(|change| change.pose);
                 queued |= self.change_elbow(*elbow, change.as_ref());
             }
+            Some(RobotChange::Hop(order)) => {
+                let hop = self.checked_hop(&self.robot.arm, order)?;
+                queued |= self.schedule.hop(&hop, order.line);
+            }
             None => {}
         }
         let moves_tool = command.dwell_s.is_some() || command.moves().next().is_some();
@@ -513,6 +522,9 @@ impl<'q> Planner<'q> {
             Some(RobotChange::Elbow(elbow)) => {
                 self.elbow_move(arm, *elbow)?;
             }
+            Some(RobotChange::Hop(order)) => {
+                self.checked_hop(arm, order)?;
+            }
             None => {}
         }
         if let Some(pose) = &command.reference {
@@ -544,6 +556,37 @@ impl<'q> Planner<'q> {
         }
         let changed = self.robot.clone().set_prefilter(config);
         changed.map_err(Cause::Prefilter)
+    }
+
+    /// A pick-and-place move that the arm can drive: up, across at the top and at the end of the
+    /// vertical parts, and down. Not inlined, as [`Planner::elbow_move`].
+    #[inline(never)]
+    fn checked_hop(&self, arm: &Arm, order: &HopMove) -> Result<Hop, Cause> {
+        let config = &self.robot.config;
+        let own = config.hop;
+        let wanted = HopConfig {
+            height_mm: order.height_mm.unwrap_or(own.height_mm),
+            rise_mm: order.rise_mm.unwrap_or(own.rise_mm),
+            tolerance_mm: order.tolerance_mm.unwrap_or(own.tolerance_mm),
+            acceleration_mm_s2: order.acceleration_mm_s2.unwrap_or(own.acceleration_mm_s2),
+            axes: own.axes,
+        };
+        let limits = HopLimits {
+            feed_mm_s: config.feed_limit_mm_s,
+            yaw_deg_s: config.yaw_limit_deg_s,
+        };
+        let prefilter = &self.robot.prefilter;
+        let hop = hop::plan(order.start, order.target, &wanted, &limits, prefilter);
+        let hop = hop.map_err(Cause::Hop)?;
+        for [start, target] in hop.outline(wanted.height_mm) {
+            let line = PathSegment {
+                start,
+                target,
+                shape: Shape::Line,
+            };
+            arm.check_segment(&line).map_err(Cause::Segment)?;
+        }
+        Ok(hop)
     }
 
     /// How long a motion takes; zero if it is shorter than anything.

@@ -2,6 +2,7 @@
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
+use crate::hop::RawHop;
 use crate::kinematics::Elbow;
 use crate::pose::Pose;
 use crate::prefilter::Kernel;
@@ -19,6 +20,9 @@ pub const KERNELS: usize = 8;
 
 /// Kernels that a line may need: two moves with two each.
 pub const KERNELS_A_LINE: usize = 4;
+
+/// Pick-and-place moves that can wait: each lasts some tenths of a second.
+pub const HOPS: usize = 3;
 
 /// What the tick carries out, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +54,7 @@ pub enum Action {
 pub struct SegmentQueue {
     items: Queue<RawItem, { LOOKAHEAD + 1 }>,
     kernels: Queue<Kernel, { KERNELS + 1 }>,
+    hops: Queue<RawHop, { HOPS + 1 }>,
 }
 
 impl SegmentQueue {
@@ -59,6 +64,7 @@ impl SegmentQueue {
         Self {
             items: Queue::new(),
             kernels: Queue::new(),
+            hops: Queue::new(),
         }
     }
 
@@ -66,14 +72,17 @@ impl SegmentQueue {
     pub fn split(&mut self) -> (SegmentProducer<'_>, SegmentConsumer<'_>) {
         let (items_in, items_out) = self.items.split();
         let (kernels_in, kernels_out) = self.kernels.split();
+        let (hops_in, hops_out) = self.hops.split();
         (
             SegmentProducer {
                 items: items_in,
                 kernels: kernels_in,
+                hops: hops_in,
             },
             SegmentConsumer {
                 items: items_out,
                 kernels: kernels_out,
+                hops: hops_out,
             },
         )
     }
@@ -83,6 +92,7 @@ impl SegmentQueue {
 pub struct SegmentProducer<'q> {
     items: Producer<'q, RawItem>,
     kernels: Producer<'q, Kernel>,
+    hops: Producer<'q, RawHop>,
 }
 
 impl SegmentProducer<'_> {
@@ -92,10 +102,11 @@ impl SegmentProducer<'_> {
         self.items.capacity()
     }
 
-    /// Places for items that are free; none while a change of the prefilter finds no room.
+    /// Places for items that are free; none while a change of the prefilter or a hop finds no
+    /// room.
     #[must_use]
     pub fn free_places(&self) -> usize {
-        if self.kernels.ready() {
+        if self.kernels.ready() && self.hops.ready() {
             self.items.capacity() - self.items.len()
         } else {
             0
@@ -133,12 +144,21 @@ impl SegmentProducer<'_> {
     fn push_with(&mut self, kernel: Kernel, item: RawItem) -> bool {
         self.items.ready() && self.kernels.enqueue(kernel).is_ok() && self.push(item)
     }
+
+    /// Appends a hop, whose segment says that it is one; `false` if there is no room.
+    pub fn push_hop(&mut self, hop: RawHop, segment: RawSegment) -> bool {
+        // The hop first, as a kernel.
+        self.free_places() > 0
+            && self.hops.enqueue(hop).is_ok()
+            && self.push(RawItem::Segment(segment))
+    }
 }
 
 /// The tick's end of the queue.
 pub struct SegmentConsumer<'q> {
     items: Consumer<'q, RawItem>,
     kernels: Consumer<'q, Kernel>,
+    hops: Consumer<'q, RawHop>,
 }
 
 impl SegmentConsumer<'_> {
@@ -166,9 +186,19 @@ impl SegmentConsumer<'_> {
         }
     }
 
-    /// Removes the oldest item.
+    /// The oldest hop: that of the oldest segment that is one.
+    #[must_use]
+    pub fn hop(&self) -> Option<&RawHop> {
+        self.hops.peek()
+    }
+
+    /// Removes the oldest item, and the hop that goes with it.
     pub fn pop(&mut self) -> Option<RawItem> {
-        self.items.dequeue()
+        let item = self.items.dequeue();
+        if matches!(&item, Some(RawItem::Segment(segment)) if segment.is_hop) {
+            self.hops.dequeue();
+        }
+        item
     }
 
     /// The oldest kernel that waits.

@@ -25,6 +25,13 @@ impl Rate {
         Self(scaled / 100).min(Self::FASTEST)
     }
 
+    /// This rate, changed towards another one by no more than a hundredth of [`Rate::ONE`].
+    pub fn towards(self, wanted: Self) -> Self {
+        const STEP: u32 = Rate::ONE.0 / 100;
+        let (low, high) = (self.0.saturating_sub(STEP), self.0.saturating_add(STEP));
+        Self(wanted.0.clamp(low, high))
+    }
+
     /// A ratio, rounded down, within [`Rate::ONE`] and [`Rate::FASTEST`].
     pub fn at_least_one(ratio: f64) -> Self {
         let scaled = ratio * f64::from(Self::ONE.0);

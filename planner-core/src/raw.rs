@@ -4,12 +4,13 @@
 //! a segment counts in 2^-62 of the segment; an arc is its chord, which is filtered with the
 //! lines, plus its bow, which is a function of the filtered progress.
 
+use crate::hop::Hop;
 use crate::math::sin_cos;
 use crate::path::PathSegment;
 use crate::path::{Arc, Shape};
 use crate::pose::{AXES, JointPosition, Pose};
 use crate::rate::Rate;
-use crate::units::TICK_HZ;
+use crate::units::{TICK_HZ, TICK_S};
 
 /// A time in 2^-32 ticks (0.23 ps).
 pub type TickTime = i64;
@@ -54,6 +55,8 @@ pub struct RawSegment {
     pub pace: Pace,
     /// Whether the oldest kernel that waits becomes the prefilter on its way.
     pub changes_over: bool,
+    /// It is a hop: the oldest one that waits beside the segments says where it goes.
+    pub is_hop: bool,
     /// The number of the line that it comes from, for status reports.
     pub line: u32,
 }
@@ -90,6 +93,7 @@ impl RawSegment {
             top_rate: Rate::ONE,
             pace: Pace::Feed,
             changes_over: false,
+            is_hop: false,
             line: 0,
         }
     }
@@ -107,6 +111,20 @@ impl RawSegment {
             start: from.to_bits(),
             target: to.to_bits(),
             ..Self::new(&rest, duration_s)
+        }
+    }
+
+    /// A pick-and-place move, after an exact stop and no faster than planned.
+    #[must_use]
+    pub fn of_hop(hop: &Hop) -> Self {
+        let ends = PathSegment {
+            start: hop.start,
+            target: hop.target,
+            shape: Shape::Line,
+        };
+        Self {
+            is_hop: true,
+            ..Self::new(&ends, f64::from(hop.raw.ticks()) * TICK_S)
         }
     }
 

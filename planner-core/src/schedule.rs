@@ -8,6 +8,7 @@ use heapless::Deque;
 
 use crate::config::Robot;
 use crate::corner::{self, Corner, CornerRule, Side, reach_s};
+use crate::hop::Hop;
 use crate::kinematics::Elbow;
 use crate::math::sqrt_f32;
 use crate::path::PathSegment;
@@ -177,6 +178,21 @@ impl<'q> Schedule<'q> {
     /// Places for kernels that are free.
     pub fn free_kernels(&self) -> usize {
         self.queue.free_kernels()
+    }
+
+    /// Plans a pick-and-place move after everything has stopped; what follows begins when it has.
+    ///
+    /// `false` if the look-ahead is full.
+    pub fn hop(&mut self, hop: &Hop, line: u32) -> bool {
+        let segment = RawSegment {
+            line,
+            ..RawSegment::of_hop(hop)
+        };
+        let queued = self.queue.push_hop(hop.raw, segment);
+        if queued {
+            self.reset();
+        }
+        queued
     }
 
     /// Plans a stand-still of `duration_s` after everything has stopped.

@@ -21,6 +21,8 @@ pub struct RawStep<'s> {
     pub moved: bool,
     /// Whether a segment began on whose way the prefilter changes.
     pub changes_over: bool,
+    /// Axes that the prefilter does not act on.
+    pub direct: [bool; AXES],
 }
 
 /// The raw path as another filter has to see it while the raw point moves evenly.
@@ -99,6 +101,7 @@ impl Stand {
             licence,
             pace: Rate::ZERO,
             even_for: 0,
+            hop_rate: wanted.min(Rate::ONE),
         };
         way.advance(next, wanted.min(licence).raw(left - wait), left - wait);
         Some(way)
@@ -136,6 +139,8 @@ struct Way {
     pace: Rate,
     /// Whole ticks at that rate in a row.
     even_for: u16,
+    /// The rate of the moment along a hop.
+    hop_rate: Rate,
 }
 
 impl Way {
@@ -159,6 +164,13 @@ impl Way {
             self.licence = wanted.min(segment.top_rate);
         }
         wanted.min(self.licence)
+    }
+
+    /// The rate of the moment along a hop, never above the planned one. It changes gradually,
+    /// because nothing smooths the axes that the prefilter does not act on.
+    fn along_hop(&mut self, wanted: Rate) -> Rate {
+        self.hop_rate = self.hop_rate.towards(wanted.min(Rate::ONE));
+        self.hop_rate
     }
 
     /// Goes on for `share` of raw time, which takes `time`.
@@ -241,6 +253,8 @@ pub struct Walker<'q> {
     point: [i32; AXES],
     rates: Rates,
     held: bool,
+    /// Axes that the prefilter does not act on, from the begin of a hop to that of what follows.
+    direct: [bool; AXES],
     /// The number of the line under way, or of the last one.
     line: u32,
 }
@@ -257,6 +271,7 @@ impl<'q> Walker<'q> {
                 rapid: Rate::ONE,
             },
             held: false,
+            direct: [false; AXES],
             line: 0,
         }
     }
@@ -270,6 +285,7 @@ impl<'q> Walker<'q> {
     pub fn place(&mut self, point: [i32; AXES]) {
         self.point = point;
         self.walk = Walk::Standing(Stand::AT_REST);
+        self.direct = [false; AXES];
     }
 
     /// Walks at these rates from now on.
@@ -360,6 +376,10 @@ impl<'q> Walker<'q> {
                     self.walk = Walk::Moving(way);
                     moved |= next.is_some_and(RawSegment::moves);
                     self.line = next.map_or(self.line, |next| next.line);
+                    self.direct = match (next, self.queue.hop()) {
+                        (Some(next), Some(hop)) if next.is_hop => hop.direct,
+                        _ => [false; AXES],
+                    };
                     began = true;
                 }
                 None => stand.time = stand.time.wrapping_add(left),
@@ -372,10 +392,16 @@ impl<'q> Walker<'q> {
             progress: 0,
             moved,
             changes_over: false,
+            direct: self.direct,
         };
         if let (Walk::Moving(way), Some(segment)) = (&self.walk, segment) {
             step.progress = to_unit(way.progress);
-            step.chord = segment.chord_point(step.progress);
+            step.chord = match self.queue.hop() {
+                Some(hop) if segment.is_hop => {
+                    hop.point(segment, segment.duration.wrapping_sub(way.remaining))
+                }
+                _ => segment.chord_point(step.progress),
+            };
             if began {
                 step.began = segment.bow.as_ref();
                 step.changes_over = segment.changes_over;
@@ -394,7 +420,7 @@ impl<'q> Walker<'q> {
                 left: ONE_TICK,
             };
         };
-        if self.held {
+        if self.held && !segment.is_hop {
             way.since_corner = way.since_corner.wrapping_add(ONE_TICK);
             way.pace = Rate::ZERO;
             way.even_for = 0;
@@ -404,8 +430,16 @@ impl<'q> Walker<'q> {
                 left: 0,
             };
         }
-        let moved = segment.moves();
-        let rate = way.rate(kernel, segment, self.rates.of(segment));
+        let rate = if segment.is_hop {
+            way.along_hop(if self.held {
+                Rate::ZERO
+            } else {
+                self.rates.of(segment)
+            })
+        } else {
+            way.rate(kernel, segment, self.rates.of(segment))
+        };
+        let moved = segment.moves() && rate > Rate::ZERO;
         let share = rate.raw(ONE_TICK);
         if way.remaining > share {
             way.advance(segment, share, ONE_TICK);
@@ -423,7 +457,7 @@ impl<'q> Walker<'q> {
         }
         let left = rate.real(share - way.remaining);
         self.point = segment.target;
-        self.walk = Walk::Standing(if moved {
+        self.walk = Walk::Standing(if segment.moves() {
             Stand {
                 time: 0,
                 licence: way.licence,

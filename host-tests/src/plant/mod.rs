@@ -10,6 +10,7 @@ pub mod delta_arm;
 pub mod full;
 pub mod ideal;
 pub mod mode;
+pub mod pendulum;
 pub mod travelling;
 
 #[cfg(test)]
@@ -22,4 +23,5 @@ pub use delta_arm::DeltaArm;
 pub use full::{FullPlant, JointSetpoint, PlantOutput};
 pub use ideal::{IdealOutput, IdealPlant};
 pub use mode::Mode;
+pub use pendulum::{PayloadConfig, PayloadSample, Pendulum};
 pub use travelling::{Answer, Base, Travel};

@@ -42,7 +42,7 @@ pub(super) enum Code {
     ToolChange,
     /// M7 to M9.
     Coolant(CoolantChange),
-    /// M100 to M102.
+    /// M100 to M103.
     Robot(RobotCode),
 }
 
@@ -101,6 +101,8 @@ pub(super) enum RobotCode {
     Prefilter,
     /// M101, M102.
     Elbow(crate::kinematics::Elbow),
+    /// M103.
+    Hop,
 }
 
 /// Modal groups of NIST RS274/NGC v3, table 4: one command of each to a line.
@@ -243,6 +245,7 @@ impl Code {
             1000 => Self::Robot(RobotCode::Prefilter),
             1010 => Self::Robot(RobotCode::Elbow(Elbow::Left)),
             1020 => Self::Robot(RobotCode::Elbow(Elbow::Right)),
+            1030 => Self::Robot(RobotCode::Hop),
             _ => return None,
         })
     }

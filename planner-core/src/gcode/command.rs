@@ -53,13 +53,34 @@ pub enum ProgramFlow {
     End,
 }
 
-/// A change of the robot. It takes effect when everything before it stands.
+/// What the robot's own words ask for. It takes effect when everything before it stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RobotChange {
     /// M100: this prefilter from here on. Its values are as given, unchecked.
     Prefilter(PrefilterConfig),
     /// M101, M102: the elbow on this side from here on.
     Elbow(Elbow),
+    /// M103: a pick-and-place move, from an exact stop to an exact stop.
+    Hop(HopMove),
+}
+
+/// A pick-and-place move; what is not given is the robot's own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HopMove {
+    /// Where it starts: at the target of the motion before, bit for bit.
+    pub start: Pose,
+    /// Where it ends.
+    pub target: Pose,
+    /// Q: the height over either place within which the path is vertical, in mm.
+    pub height_mm: Option<f32>,
+    /// R: how far it rises over the higher place, in mm.
+    pub rise_mm: Option<f32>,
+    /// P: how far the prefilter may bend the vertical parts, in mm.
+    pub tolerance_mm: Option<f32>,
+    /// K: the acceleration, in mm/s².
+    pub acceleration_mm_s2: Option<f32>,
+    /// The N word, or the number of the line in its program.
+    pub line: u32,
 }
 
 /// A motion from where the last one ended. It has a length: in space, or in yaw.

@@ -76,7 +76,7 @@ pub enum Error {
         /// The word's letter.
         letter: u8,
     },
-    /// 26: an arc, G10, G92 or a jog without axis words.
+    /// 26: an arc, G10, G92, M103 or a jog without axis words.
     NoAxisWords,
     /// 27: N beyond 10,000,000.
     LineNumber,
@@ -128,7 +128,7 @@ pub enum Error {
     },
     /// 64: more words than a line can use.
     TooManyWords,
-    /// 65: G4 or G10 beside G64 (whose is P?), or M100 to M102 beside another command.
+    /// 65: G4 or G10 beside G64 (whose is P?), or M100 to M103 beside another command.
     OwnLine,
     /// 75: an arc in G18 or G19.
     ArcPlane,
@@ -307,7 +307,7 @@ impl fmt::Display for Error {
                 );
             }
             Self::OwnLine => {
-                "G64 beside G4 or G10, or M100 to M102 beside others: give each its own line"
+                "G64 beside G4 or G10, or M100 to M103 beside others: give each its own line"
             }
             Self::ArcPlane => "an arc must lie in the XY plane: give G17 before it",
             Self::CornerOverlap => "G64 takes P in mm or Q of 0 to 100 percent: give one of them",

@@ -183,7 +183,7 @@ impl Interpreter {
         let mut block = Block::collect(line, &mut modal)?;
         let line_number = take_line_number(&mut block)?.unwrap_or(block.modal.lines);
         if let Some(code) = block.robot {
-            let command = robot_command(block, code)?;
+            let command = robot_command(block, code, &self.offsets, line_number)?;
             return Ok(self.done(modal, command, None));
         }
         self.take_plain_values(&mut block)?;

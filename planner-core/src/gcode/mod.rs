@@ -33,7 +33,7 @@ mod receiver;
 mod robot_words;
 
 pub use command::{
-    BLOW_OFF, Command, Feed, GRIPPER, MAX_ACTIONS_A_LINE, Move, ProgramFlow, RobotChange,
+    BLOW_OFF, Command, Feed, GRIPPER, HopMove, MAX_ACTIONS_A_LINE, Move, ProgramFlow, RobotChange,
 };
 pub use error::Error;
 pub use interpreter::{Interpreted, Interpreter};

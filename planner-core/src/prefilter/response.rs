@@ -47,10 +47,15 @@ struct Piece {
 
 /// A term `c (t − b)₊ⁿ / n!` of the ramp response.
 #[derive(Clone, Copy)]
-struct Term {
-    b: f64,
-    c: f64,
+pub(crate) struct Term {
+    /// `b` in seconds.
+    pub b: f64,
+    /// `c`.
+    pub c: f64,
 }
+
+/// The terms of a ramp response.
+pub(crate) type Terms = Vec<Term, MAX_BREAKS>;
 
 impl Response {
     /// The response of a cascade, or of the same cascade run backwards in time.
@@ -141,14 +146,15 @@ impl Response {
     }
 }
 
-fn boxes(stages: &[Stage]) -> usize {
+/// How many boxes are among the stages.
+pub(crate) fn boxes(stages: &[Stage]) -> usize {
     let is_box = |stage: &&Stage| matches!(stage, Stage::Box(_));
     stages.iter().filter(is_box).count()
 }
 
 /// The terms of a cascade's ramp response, or of that run backwards; none if they are too many.
-fn terms(stages: &[Stage], reversed: bool) -> Option<Vec<Term, MAX_BREAKS>> {
-    let mut terms: Vec<Term, MAX_BREAKS> = Vec::new();
+pub(crate) fn terms(stages: &[Stage], reversed: bool) -> Option<Terms> {
+    let mut terms = Terms::new();
     add(&mut terms, Term { b: 0.0, c: 1.0 })?;
     for stage in stages {
         let impulses = match stage {

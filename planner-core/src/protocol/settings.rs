@@ -9,6 +9,7 @@ use super::homing::HomingConfig;
 #[cfg(doc)]
 use super::report::Inputs;
 use crate::config::{RobotConfig, SettingError, SettingValue};
+use crate::hop::HopAxes;
 use crate::prefilter::Kind as Prefilter;
 
 /// How the controller deals with its sender and its inputs.
@@ -147,8 +148,18 @@ const PREFILTERS: &[&str] = &{
     names
 };
 
+const HOP_AXES: &[&str] = &{
+    let mut names = [""; HopAxes::ALL.len()];
+    let mut i = 0;
+    while i < names.len() {
+        names[i] = HopAxes::ALL[i].name();
+        i += 1;
+    }
+    names
+};
+
 /// The table, by number.
-pub const SETTINGS: [Setting; 69] = [
+pub const SETTINGS: [Setting; 74] = [
     setting(
         5,
         "inputs-inverted",
@@ -608,6 +619,46 @@ pub const SETTINGS: [Setting; 69] = [
         decimal(0.0, 1000.0),
     ),
     setting(
+        1090,
+        "hop-height",
+        MOTION,
+        "Vertical part of a hop",
+        "mm",
+        decimal(0.0, 1000.0),
+    ),
+    setting(
+        1091,
+        "hop-rise",
+        MOTION,
+        "Rise of a hop",
+        "mm",
+        decimal(0.001, 1000.0),
+    ),
+    setting(
+        1092,
+        "hop-tolerance",
+        MOTION,
+        "Tolerance of a hop's vertical part",
+        "mm",
+        decimal(0.001, 10_000.0),
+    ),
+    setting(
+        1093,
+        "hop-acceleration",
+        MOTION,
+        "Acceleration of a hop",
+        "mm/s^2",
+        decimal(1.0, 1e6),
+    ),
+    setting(
+        1094,
+        "hop-axes",
+        MOTION,
+        "Prefiltered axes of a hop",
+        "",
+        Kind::Choice(HOP_AXES),
+    ),
+    setting(
         1110,
         "delta-base",
         ROBOT,
@@ -971,6 +1022,8 @@ mod tests {
                 "feed-limit",
                 "yaw-limit",
                 "joint-speed",
+                "hop-tolerance",
+                "hop-acceleration",
                 "damping",
                 "v-tol",
                 "damping2",
