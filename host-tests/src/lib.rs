@@ -16,6 +16,7 @@ pub mod machine;
 pub mod methods;
 pub mod oracle;
 pub mod paired_run;
+pub mod payload_search;
 pub mod pictures;
 pub mod plant;
 pub mod plant_config;

@@ -6,7 +6,7 @@ use planner_core::servo::ServoConfig;
 
 use crate::plant::arm::ArmInertia;
 use crate::plant::config::JOINTS;
-use crate::plant::{Body, DeltaArm, FullConfig, Mode, ModeMap, ScaraArm};
+use crate::plant::{Body, DeltaArm, FullConfig, Mode, ModeMap, PayloadConfig, ScaraArm};
 
 /// Lowest frequency that a posture-dependent mode falls to.
 const MODE_MIN_HZ: f64 = 0.1;
@@ -44,6 +44,8 @@ pub struct PlantConfig {
     pub noise_seed: u64,
     /// The servos of the joints.
     pub servos: [ServoConfig; JOINTS],
+    /// What swings under the tool, if anything does.
+    pub payload: Option<PayloadConfig>,
 }
 
 impl Default for PlantConfig {
@@ -60,6 +62,7 @@ impl Default for PlantConfig {
             encoder_noise_mm: 1e-4,
             noise_seed: 0,
             servos: FullConfig::default().joints.map(|joint| joint.servo),
+            payload: None,
         }
     }
 }
@@ -126,9 +129,40 @@ impl PlantConfig {
             ("plant.encoder_noise_rad", self.encoder_noise_rad, 0.0, 1e-3),
             ("plant.encoder_noise_mm", self.encoder_noise_mm, 0.0, 1.0),
         ];
+        let payload = self.payload.map(|payload| {
+            [
+                ("plant.payload.mass_kg", payload.mass_kg, 0.001, 100.0),
+                ("plant.payload.length_mm", payload.length_mm, 1.0, 2000.0),
+                (
+                    "plant.payload.stiffness_nm_per_deg",
+                    payload.stiffness_nm_per_deg,
+                    0.0,
+                    10.0,
+                ),
+                (
+                    "plant.payload.damping_nm_s_per_deg",
+                    payload.damping_nm_s_per_deg,
+                    0.0,
+                    1.0,
+                ),
+                (
+                    "plant.payload.peel_off_mm_s2",
+                    payload.peel_off_mm_s2,
+                    1.0,
+                    1e7,
+                ),
+                (
+                    "plant.payload.overshoot_limit_mm",
+                    payload.overshoot_limit_mm,
+                    0.001,
+                    1000.0,
+                ),
+            ]
+        });
         // Written so that NaN is out of range.
         let wrong = ranges
             .into_iter()
+            .chain(payload.into_iter().flatten())
             .find(|(_, value, low, high)| !(low..=high).contains(&value));
         if let Some((key, value, low, high)) = wrong {
             return Err(PlantConfigError {

@@ -7,13 +7,14 @@ use std::fmt;
 use std::path::Path;
 
 use planner_core::config::{ConfigError, Robot, RobotConfig};
+use planner_core::hop::{HopAxes, HopError};
 use planner_core::kinematics::{ArmKind, DeltaConfig, DeltaError, Elbow, JointRange, ScaraError};
 use planner_core::posture::{FollowError, MapError};
 use planner_core::prefilter::{CustomImpulse, Kind, MAX_IMPULSES, PrefilterConfig, PrefilterError};
 use planner_core::servo::ServoConfig;
 use serde::{Deserialize, Deserializer};
 
-use crate::plant::{DeltaArm, FullConfig, Mode};
+use crate::plant::{DeltaArm, FullConfig, Mode, PayloadConfig};
 use crate::plant_config::PlantConfig;
 use crate::toml_place::{key_at, line_at, line_of};
 
@@ -170,6 +171,15 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
             }
             FollowError::Shortest(_) => vec!["prefilter.residual_limit", "prefilter.uncertainty"],
         },
+        ConfigError::Hop(error) => match error {
+            HopError::Rise { .. } => vec!["hop.rise_mm", "hop.height_mm"],
+            HopError::Range { name, .. } => match *name {
+                "hop-height" => vec!["hop.height_mm"],
+                "hop-rise" => vec!["hop.rise_mm"],
+                "hop-tolerance" => vec!["hop.tolerance_mm"],
+                _ => vec!["hop.acceleration_mm_s2"],
+            },
+        },
         ConfigError::Range { name, .. } => match *name {
             "tolerance" => vec!["motion.corner_tolerance_mm"],
             "overlap" => vec!["motion.corner_overlap_percent"],
@@ -189,6 +199,7 @@ struct Tables {
     delta: DeltaTable,
     prefilter: PrefilterTable,
     motion: MotionTable,
+    hop: HopTable,
     plant: PlantTable,
     servo: ServoTables,
 }
@@ -294,6 +305,17 @@ struct MotionTable {
 
 #[derive(Deserialize, Default)]
 #[serde(default, deny_unknown_fields)]
+struct HopTable {
+    height_mm: Option<f32>,
+    rise_mm: Option<f32>,
+    tolerance_mm: Option<f32>,
+    acceleration_mm_s2: Option<f32>,
+    #[serde(deserialize_with = "hop_axes")]
+    axes: Option<HopAxes>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
 struct PlantTable {
     mode_frequency_hz: Option<f64>,
     mode_damping: Option<f64>,
@@ -307,6 +329,41 @@ struct PlantTable {
     encoder_noise_rad: Option<f64>,
     encoder_noise_mm: Option<f64>,
     noise_seed: Option<u64>,
+    payload: Option<PayloadTable>,
+}
+
+/// The gripper, and keys that differ from it.
+#[derive(Deserialize, Default, Clone, Copy)]
+#[serde(default, deny_unknown_fields)]
+struct PayloadTable {
+    gripper: Option<GripperName>,
+    mass_kg: Option<f64>,
+    length_mm: Option<f64>,
+    stiffness_nm_per_deg: Option<f64>,
+    damping_nm_s_per_deg: Option<f64>,
+    peel_off_mm_s2: Option<f64>,
+    overshoot_limit_mm: Option<f64>,
+}
+
+#[derive(Deserialize, Default, Clone, Copy)]
+#[serde(rename_all = "lowercase")]
+enum GripperName {
+    #[default]
+    Flexible,
+    Stiff,
+}
+
+fn hop_axes<'de, D: Deserializer<'de>>(text: D) -> Result<Option<HopAxes>, D::Error> {
+    let name = String::deserialize(text)?;
+    let known = || HopAxes::ALL.map(HopAxes::name).join(", ");
+    let unknown = || {
+        format!(
+            "a hop cannot be prefiltered on `{name}`: give one of {}",
+            known()
+        )
+    };
+    let axes = HopAxes::from_name(&name).ok_or_else(|| serde::de::Error::custom(unknown()))?;
+    Ok(Some(axes))
 }
 
 #[derive(Deserialize, Default)]
@@ -400,6 +457,12 @@ impl Tables {
         set(&mut robot.feed_limit_mm_s, motion.feed_limit_mm_s);
         set(&mut robot.yaw_limit_deg_s, motion.yaw_limit_deg_s);
         set(&mut robot.joint_speed_deg_s, motion.joint_speed_deg_s);
+        let hop = &self.hop;
+        set(&mut robot.hop.height_mm, hop.height_mm);
+        set(&mut robot.hop.rise_mm, hop.rise_mm);
+        set(&mut robot.hop.tolerance_mm, hop.tolerance_mm);
+        set(&mut robot.hop.acceleration_mm_s2, hop.acceleration_mm_s2);
+        set(&mut robot.hop.axes, hop.axes);
         let mut plant = self.plant.config(&robot);
         let servo = &self.servo;
         let tables = [&servo.joint1, &servo.joint2, &servo.joint3, &servo.joint4];
@@ -468,6 +531,7 @@ impl PlantTable {
         set(&mut plant.encoder_noise_rad, self.encoder_noise_rad);
         set(&mut plant.encoder_noise_mm, self.encoder_noise_mm);
         set(&mut plant.noise_seed, self.noise_seed);
+        plant.payload = self.payload.map(PayloadConfig::from);
         plant
     }
 
@@ -508,6 +572,28 @@ impl ServoTable {
         );
         set(&mut servo.torque_limit, self.torque_limit);
         set(&mut servo.observer_rad_s, self.observer_rad_s);
+    }
+}
+
+impl From<PayloadTable> for PayloadConfig {
+    fn from(table: PayloadTable) -> Self {
+        let mut payload = match table.gripper.unwrap_or_default() {
+            GripperName::Flexible => Self::FLEXIBLE,
+            GripperName::Stiff => Self::STIFF,
+        };
+        set(&mut payload.mass_kg, table.mass_kg);
+        set(&mut payload.length_mm, table.length_mm);
+        set(
+            &mut payload.stiffness_nm_per_deg,
+            table.stiffness_nm_per_deg,
+        );
+        set(
+            &mut payload.damping_nm_s_per_deg,
+            table.damping_nm_s_per_deg,
+        );
+        set(&mut payload.peel_off_mm_s2, table.peel_off_mm_s2);
+        set(&mut payload.overshoot_limit_mm, table.overshoot_limit_mm);
+        payload
     }
 }
 
@@ -569,13 +655,19 @@ mod tests {
     #[test]
     fn keys_reach_their_settings() {
         let text = "[arm]\nelbow = 'left'\nlink2_mm = 180\njoint2.min_deg = -150\n\
-                    [prefilter]\nname = 'ZV'\n[plant]\nmode_damping = 0.1\nnoise_seed = 7";
+                    [prefilter]\nname = 'ZV'\n[hop]\naxes = 'across'\n\
+                    [plant]\nmode_damping = 0.1\nnoise_seed = 7\n\
+                    [plant.payload]\ngripper = 'stiff'\nmass_kg = 0.1";
         let found = RobotSettings::parse("r.toml", text).unwrap();
         assert_eq!(found.robot.scara.elbow, Elbow::Left);
         assert_eq!(found.robot.scara.joint_limits[1].min, -150.0);
         assert_eq!(found.robot.prefilter.kind, Kind::Zv);
         assert_eq!((found.plant.link1_mm, found.plant.link2_mm), (200.0, 180.0));
         assert_eq!((found.plant.mode.damping, found.plant.noise_seed), (0.1, 7));
+        assert_eq!(found.robot.hop.axes, HopAxes::Across);
+        let payload = found.plant.payload.unwrap();
+        assert_eq!(payload.length_mm, PayloadConfig::STIFF.length_mm);
+        assert_eq!(payload.mass_kg, 0.1);
     }
 
     #[test]
@@ -677,6 +769,18 @@ mod tests {
             (
                 "robot = 'delta'\nplant.platform_kg = 0",
                 "r.toml, line 2, key plant.platform_kg: 0 is outside",
+            ),
+            (
+                "[hop]\nrise_mm = 20",
+                "r.toml, line 2, key hop.rise_mm: the hop rises by 20 mm",
+            ),
+            (
+                "[hop]\naxes = 'z'",
+                "key hop.axes: a hop cannot be prefiltered on `z`",
+            ),
+            (
+                "[plant.payload]\nlength_mm = 0",
+                "r.toml, line 2, key plant.payload.length_mm: 0 is outside 1 to 2000",
             ),
             ("[arm\n", "r.toml, line 1: "),
         ] {

@@ -5,6 +5,7 @@ use planner_core::config::Robot;
 use planner_core::corner::CornerRule;
 use planner_core::prefilter::Kind;
 
+use crate::checker::hops::{Hop, HopDefaults, hops, vertical_deviations_mm};
 use crate::checker::{
     self, CheckOptions, JointPeaks, Program, Report, TraceRow, joint_peaks, settling_time_s,
 };
@@ -12,6 +13,7 @@ use crate::machine::Machine;
 use crate::program_file::ProgramFile;
 use crate::progress::Progress;
 use crate::robot_file::RobotSettings;
+use crate::summary::PayloadFigures;
 use crate::trace::{PlantKind, SETTLED_MM, Trace};
 use crate::vector::xyz;
 use crate::vibration::Vibration;
@@ -45,6 +47,10 @@ pub struct Outcome {
     pub settling_time_s: Option<f64>,
     /// Tool accelerations over the motion and 3 s more.
     pub vibration: Vibration,
+    /// How far hops are bent where they have to be vertical; none where there are no hops.
+    pub vertical_deviation_mm: Option<f64>,
+    /// What the payload does.
+    pub payload: PayloadFigures,
     /// Peaks of the joint setpoints.
     pub joint_peaks: JointPeaks,
     /// Instructions of the dearest tick; the host does not count.
@@ -104,10 +110,28 @@ impl Scenario {
             cycle_time_s: Trace::time_s(stop) - Trace::time_s(start.min(stop)),
             settling_time_s: settling_time_s(&times, &tool, end, Trace::time_s(stop), SETTLED_MM),
             vibration: Vibration::measure(&trace.accelerations(), trace.driven),
+            vertical_deviation_mm: self.vertical_deviation_mm(&rows),
+            payload: PayloadFigures::new(&trace, self.settings.plant.payload.as_ref()),
             joint_peaks: joint_peaks(&trace.joints(), Trace::time_s(1)),
             tick_instructions_max: None,
             trace,
         }
+    }
+
+    /// The hops of the program, as the checker reads them.
+    #[must_use]
+    pub fn hops(&self) -> Vec<Hop> {
+        let own = self.settings.robot.hop;
+        let defaults = HopDefaults {
+            height_mm: own.height_mm.into(),
+            tolerance_mm: own.tolerance_mm.into(),
+        };
+        hops(&self.program.text, defaults).unwrap_or_default()
+    }
+
+    fn vertical_deviation_mm(&self, rows: &[TraceRow]) -> Option<f64> {
+        let found = vertical_deviations_mm(&self.hops(), rows);
+        found.into_iter().reduce(f64::max)
     }
 
     fn check_options(&self, robot: &Robot) -> CheckOptions {

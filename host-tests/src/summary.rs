@@ -7,7 +7,9 @@ use planner_core::pose::JointUnit;
 use serde::Serialize;
 
 use crate::checker::Report;
+use crate::plant::{PayloadConfig, PayloadSample};
 use crate::scenario::{Outcome, Scenario};
+use crate::trace::Trace;
 
 /// Figures of a run.
 #[derive(Clone, Debug, Serialize, PartialEq)]
@@ -47,6 +49,11 @@ pub struct Figures {
     pub max_corner_error_mm: Option<f64>,
     /// Largest distance of the command from the programmed path; null likewise.
     pub max_path_deviation_mm: Option<f64>,
+    /// How far hops are bent where they have to be vertical; null where there are none.
+    pub vertical_deviation_max_mm: Option<f64>,
+    /// What the payload does; null where there is none.
+    #[serde(flatten)]
+    pub payload: PayloadFigures,
     /// Maximum of the tool's acceleration, motion and 3 s more.
     pub vibration_max_mm_s2: f64,
     /// RMS of the same.
@@ -71,6 +78,43 @@ pub struct Figures {
     pub joint3_peak_rad_s2: Option<f64>,
     /// Likewise of joint 4.
     pub joint4_peak_rad_s2: f64,
+}
+
+/// What the payload does, motion and 3 s more; null where there is none.
+#[derive(Clone, Copy, Debug, Default, Serialize, PartialEq)]
+pub struct PayloadFigures {
+    /// Its largest acceleration, without gravity.
+    pub payload_acceleration_max_mm_s2: Option<f64>,
+    /// How far it is from where it hangs at rest, at the most.
+    pub payload_swing_max_mm: Option<f64>,
+    /// The same after the commanded stop.
+    pub payload_overshoot_max_mm: Option<f64>,
+    /// Whether its acceleration exceeds what the gripper holds.
+    pub peeled_off: Option<bool>,
+}
+
+impl PayloadFigures {
+    /// The figures of a trace, with the gripper's limit.
+    #[must_use]
+    pub fn new(trace: &Trace, config: Option<&PayloadConfig>) -> Self {
+        let Some(config) = config else {
+            return Self::default();
+        };
+        let rows = trace.setpoints.len().min(trace.payload.len());
+        let samples = &trace.payload[..rows];
+        let after = &samples[trace.stop().min(rows)..];
+        let swing = |list: &[PayloadSample]| list.iter().map(|s| s.swing_mm).fold(0.0, f64::max);
+        let acceleration = samples
+            .iter()
+            .map(|s| s.acceleration_mm_s2)
+            .fold(0.0, f64::max);
+        Self {
+            payload_acceleration_max_mm_s2: Some(acceleration),
+            payload_swing_max_mm: Some(swing(samples)),
+            payload_overshoot_max_mm: Some(swing(after)),
+            peeled_off: Some(acceleration > config.peel_off_mm_s2),
+        }
+    }
 }
 
 /// Vibration as a fraction of that without a prefilter; null if that is zero.
@@ -144,6 +188,8 @@ impl Figures {
             settling_time_s: outcome.settling_time_s,
             max_corner_error_mm: report.map(Report::max_corner_error_mm),
             max_path_deviation_mm: report.map(|report| report.max_path_deviation_mm),
+            vertical_deviation_max_mm: outcome.vertical_deviation_mm,
+            payload: outcome.payload,
             vibration_max_mm_s2: vibration.max_mm_s2,
             vibration_rms_mm_s2: vibration.rms_mm_s2,
             vibration_motion_max_mm_s2: vibration.motion_max_mm_s2,

@@ -7,7 +7,7 @@ use planner_core::pose::{AXES, JointUnit};
 use planner_core::units::{TICK_HZ, TICK_S};
 
 use crate::plant::full::LATENCY_TICKS;
-use crate::plant::{FullPlant, IdealPlant, JointSetpoint};
+use crate::plant::{FullPlant, IdealPlant, JointSetpoint, PayloadSample, Pendulum};
 use crate::plant_config::PlantConfig;
 use crate::progress::Progress;
 use crate::vector::{distance, xyz};
@@ -73,6 +73,8 @@ pub struct Trace {
     pub setpoints: Vec<Setpoint>,
     /// The tool; it goes on after the setpoints until it has settled.
     pub tool: Vec<ToolSample>,
+    /// The payload, a row for each of the tool's; empty where there is none.
+    pub payload: Vec<PayloadSample>,
     /// Rows in which the tool is driven; what follows is residual vibration.
     pub driven: usize,
 }
@@ -94,9 +96,17 @@ impl Trace {
         let end = xyz(pose(&last));
         let mut step = plant(recorded.first().unwrap_or(&last), kind, config);
         let mut tool = Vec::with_capacity(setpoints.len());
+        let mut payload = Vec::new();
+        let start = xyz(pose(recorded.first().unwrap_or(&last)));
+        let mut pendulum = config
+            .payload
+            .map(|config| Pendulum::new(config, TICK_S, start));
         let mut settled_from = 0;
         let mut follow = |setpoint: &Setpoint| {
             let sample = step(setpoint);
+            if let Some(pendulum) = &mut pendulum {
+                payload.push(pendulum.step(sample.position_mm));
+            }
             tool.push(sample);
             if distance(sample.position_mm, end) > SETTLED_MM {
                 settled_from = tool.len();
@@ -118,6 +128,7 @@ impl Trace {
             driven: (last_change(&setpoints) + kind.latency_ticks()).min(setpoints.len()),
             setpoints,
             tool,
+            payload,
         }
     }
 

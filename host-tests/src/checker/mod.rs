@@ -3,6 +3,7 @@
 //! It shares nothing with the planner nor with the oracle: its own reading of the
 //! G-code, its own geometry, no model of prefilters. All functions are pure.
 
+pub mod hops;
 pub mod joints;
 pub mod matching;
 pub mod program;

@@ -8,10 +8,12 @@ use clap::Args;
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{Attribute, Cell, CellAlignment, LineStyle, Table};
 use planner_core::config::{ConfigError, Robot};
+use planner_core::hop::HopAxes;
 use planner_core::prefilter::{Kind, PrefilterError};
 use serde::Serialize;
 
 use super::ScenarioArgs;
+use crate::payload_search::{self, Fastest};
 use crate::progress::Progress;
 use crate::scenario::{Outcome, Scenario};
 use crate::summary::{Figures, Ratios};
@@ -36,6 +38,8 @@ pub struct Comparison {
     tolerance_mm: f32,
     plant: &'static str,
     prefilters: Vec<Row>,
+    /// The fastest hops that the payload allows; empty without payload or hops.
+    fastest_hops: Vec<Fastest>,
 }
 
 /// One prefilter.
@@ -118,6 +122,7 @@ impl Comparison {
         rows.sort_by_key(|(order, _)| *order);
         let robot = &scenario.settings.robot;
         Ok(Self {
+            fastest_hops: fastest_hops(scenario)?,
             program: scenario.program.name.clone(),
             frequency_hz: robot.prefilter.frequency_hz,
             damping: robot.prefilter.damping,
@@ -153,11 +158,76 @@ impl Comparison {
             "{}: {} Hz, damping {}, corner tolerance {} mm, {} plant\n{table}\n\
              Settling to ±50 µm after the commanded stop; largest corner error; the tool's \
              acceleration in mm/s²\nin motion and in the 3 s after, and over both as a part of \
-             that without a prefilter; peak joint accelerations.{refused}",
-            self.program, self.frequency_hz, self.damping, self.tolerance_mm, self.plant
+             that without a prefilter; peak joint accelerations.{refused}{}",
+            self.program,
+            self.frequency_hz,
+            self.damping,
+            self.tolerance_mm,
+            self.plant,
+            self.hop_table()
+        )
+    }
+
+    /// The fastest hops as a table of their own; nothing without any.
+    fn hop_table(&self) -> String {
+        if self.fastest_hops.is_empty() {
+            return String::new();
+        }
+        let mut table = Table::new();
+        let header = HOP_HEADER.map(|text| Cell::new(text).add_attribute(Attribute::Bold));
+        table
+            .load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()))
+            .set_header(header);
+        for Fastest { limit, axes, run } in &self.fastest_hops {
+            let mut cells = vec![limit.name().to_owned(), (*axes).to_owned()];
+            cells.extend(run.map_or_else(
+                || vec!["none".to_owned()],
+                |run| {
+                    vec![
+                        format!("{:.0}", run.acceleration_mm_s2),
+                        format!("{:.3}", run.cycle_time_s),
+                        format!("{:.0}", run.payload_acceleration_max_mm_s2),
+                        format!("{:.1}", run.payload_swing_max_mm),
+                        format!("{:.1}", run.payload_overshoot_max_mm),
+                    ]
+                },
+            ));
+            table.add_row(cells);
+        }
+        for column in table.column_iter_mut().skip(2) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        format!(
+            "\n\nThe fastest hops within the payload's limits, by the axes that are prefiltered; \
+             slower ones keep the limit too:\n{table}"
         )
     }
 }
+
+/// The fastest hops by limit and axes. None if there is nothing to search.
+fn fastest_hops(scenario: &Scenario) -> Result<Vec<Fastest>> {
+    let hops = scenario.hops();
+    let is_open = !hops.is_empty() && hops.iter().all(|hop| !hop.sets_acceleration);
+    if scenario.settings.plant.payload.is_none() || !is_open {
+        return Ok(Vec::new());
+    }
+    let mut found = Vec::new();
+    for axes in HopAxes::ALL {
+        found.extend(payload_search::fastest(scenario, axes)?);
+    }
+    found.sort_by_key(|fastest| fastest.limit as usize);
+    Ok(found)
+}
+
+const HOP_HEADER: [&str; 7] = [
+    "limit",
+    "axes",
+    "acceleration\nmm/s²",
+    "cycle\ns",
+    "payload\nmm/s²",
+    "swing\nmm",
+    "after stop\nmm",
+];
 
 const HEADER: [&str; 10] = [
     "prefilter",

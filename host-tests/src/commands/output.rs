@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 
 use crate::paired_run::PairedRun;
 use crate::pictures;
-use crate::summary::Summary;
+use crate::summary::{PayloadFigures, Summary};
 
 /// A figure in words.
 pub struct Figure {
@@ -58,12 +58,42 @@ pub fn figures(summary: &Summary) -> Vec<Figure> {
             ),
         ),
     ];
+    if figures.vertical_deviation_max_mm.is_some() {
+        list.push((
+            "bent where vertical",
+            length(figures.vertical_deviation_max_mm),
+        ));
+    }
+    list.extend(payload_figures(&figures.payload));
     if let Some(instructions) = summary.tick_instructions_max {
         list.push(("worst tick", format!("{instructions} instructions")));
     }
     list.into_iter()
         .map(|(name, value)| Figure { name, value })
         .collect()
+}
+
+/// What the payload does, in words; nothing where there is none.
+fn payload_figures(figures: &PayloadFigures) -> Vec<(&'static str, String)> {
+    let (Some(acceleration), Some(swing), Some(overshoot), Some(peeled_off)) = (
+        figures.payload_acceleration_max_mm_s2,
+        figures.payload_swing_max_mm,
+        figures.payload_overshoot_max_mm,
+        figures.peeled_off,
+    ) else {
+        return Vec::new();
+    };
+    let held = if peeled_off { "it peels off" } else { "held" };
+    vec![
+        (
+            "payload acceleration",
+            format!("{acceleration:.0} mm/s², {held}"),
+        ),
+        (
+            "payload swing",
+            format!("{swing:.2} mm, {overshoot:.2} mm after the stop"),
+        ),
+    ]
 }
 
 /// A ratio of vibrations as a sentence's end.
