@@ -5,8 +5,8 @@
 
 use super::report::TraceRow;
 
-/// A command nearer to a place than this has arrived there, in mm: some bits of its resolution.
-const ARRIVED_MM: f64 = 1e-5;
+/// A command nearer to a place than this has arrived there, in mm.
+const ARRIVED_MM: f64 = 2e-4;
 
 /// A pick-and-place move as programmed.
 #[derive(Clone, Copy, Debug, PartialEq)]
