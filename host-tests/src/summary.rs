@@ -87,7 +87,7 @@ pub struct PayloadFigures {
     pub payload_acceleration_max_mm_s2: Option<f64>,
     /// How far it is from where it hangs at rest, at the most.
     pub payload_swing_max_mm: Option<f64>,
-    /// The same after the commanded stop.
+    /// The same after the tool has been driven for the last time.
     pub payload_overshoot_max_mm: Option<f64>,
     /// Whether its acceleration exceeds what the gripper holds.
     pub peeled_off: Option<bool>,
@@ -102,7 +102,7 @@ impl PayloadFigures {
         };
         let rows = trace.setpoints.len().min(trace.payload.len());
         let samples = &trace.payload[..rows];
-        let after = &samples[trace.stop().min(rows)..];
+        let after = &samples[trace.driven.min(rows)..];
         let swing = |list: &[PayloadSample]| list.iter().map(|s| s.swing_mm).fold(0.0, f64::max);
         let acceleration = samples
             .iter()

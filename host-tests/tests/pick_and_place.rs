@@ -138,10 +138,15 @@ fn the_use_cases_are_solved_by_search() {
 fn small_swings_obey_the_law_of_the_shaper() {
     // |cos(π r/2)| of the unshaped residual, r = actual/model frequency
     let acceleration = 20.0;
-    let unshaped = run(&flexible(), HopAxes::None, acceleration).unwrap();
+    // across only: even so slow a rise would couple with the small residual
+    let flat = |frequency_hz| {
+        let mut scenario = published(PayloadConfig::FLEXIBLE, frequency_hz);
+        scenario.program.text = "G0 X-350 Y400 Z0\nM103 X350 Q0 R0.001\nM2".into();
+        scenario
+    };
+    let unshaped = run(&flat(2.4727), HopAxes::None, acceleration).unwrap();
     for ratio in [0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2] {
-        let scenario = published(PayloadConfig::FLEXIBLE, 2.4727 / ratio as f32);
-        let shaped = run(&scenario, HopAxes::Across, acceleration).unwrap();
+        let shaped = run(&flat(2.4727 / ratio as f32), HopAxes::Across, acceleration).unwrap();
         let found = shaped.payload_overshoot_max_mm / unshaped.payload_overshoot_max_mm;
         let expected = (std::f64::consts::FRAC_PI_2 * ratio).cos().abs();
         println!(
@@ -205,10 +210,10 @@ fn command(robot: &Robot, program: &str, meanwhile: Meanwhile) -> Vec<TraceRow> 
 fn vertical_parts_are_vertical_whatever_is_filtered() {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let mut tightest = 0.0_f64;
-    for round in 0..200 {
+    for round in 0..600 {
         let mut settings = flexible().settings.robot;
         settings.prefilter.kind = Kind::ALL[random.random_range(0..Kind::ALL.len())];
-        settings.prefilter.frequency_hz = random.random_range(2.4..20.0);
+        settings.prefilter.frequency_hz = random.random_range(4.0..20.0);
         settings.prefilter.damping = random.random_range(0.0..0.1);
         settings.hop.axes = HopAxes::ALL[round % 3];
         settings.hop.acceleration_mm_s2 = random.random_range(500.0..20_000.0);
@@ -264,14 +269,44 @@ fn vertical_parts_are_vertical_whatever_is_filtered() {
 }
 
 #[test]
+fn a_hop_is_held_gently_on_unfiltered_axes() {
+    let mut settings = flexible().settings.robot;
+    settings.hop.axes = HopAxes::None;
+    let robot = Robot::new(&settings).unwrap();
+    let program = "G0 X-350 Y400 Z-100\nM103 X350\nM2";
+    let (acceleration, speed) = (5000.0, (5000.0 * 700.0_f64 / 1.2).sqrt());
+    for at in (20..1100).step_by(90) {
+        let rows = command(&robot, program, Meanwhile::Held(at, at + 400));
+        let mut longest_stand = 0;
+        let mut stand = 0;
+        for three in rows.windows(3) {
+            let [a, b, c] = [three[0].pose, three[1].pose, three[2].pose];
+            for axis in 0..3 {
+                let bend_mm_s2 = (c[axis] - 2.0 * b[axis] + a[axis]).abs() * 1e6;
+                // its own acceleration, and the speed given up in a tenth of a second
+                let bound = acceleration + 10.0 * speed + 20.0;
+                assert!(bend_mm_s2 < bound, "held at {at}: {bend_mm_s2} mm/s²");
+            }
+            stand = if b == c { stand + 1 } else { 0 };
+            longest_stand = longest_stand.max(stand);
+        }
+        assert!(
+            longest_stand > 250,
+            "held at {at}: stood for {longest_stand} ms"
+        );
+        assert_eq!(rows[rows.len() - 1].pose[..3], [350.0, 400.0, -100.0]);
+    }
+}
+
+#[test]
 fn a_hop_that_cannot_be_driven_is_refused() {
     let robot = Robot::new(&flexible().settings.robot).unwrap();
     for (line, code) in [
         ("M103 Q30", 26),
-        ("M103 X0 Q50 R40", 77),
-        ("M103 X0 P0", 77),
+        ("M103 X0 Q50 R40", 85),
+        ("M103 X0 P0", 85),
         ("M103 X0 R900", 72),
-        ("M103 X0 Y900", 70),
+        ("M103 X0 Y900", 71),
         ("M103 X0 F100", 36),
         ("M103 X0 G1", 65),
     ] {

@@ -88,7 +88,7 @@ impl LineError {
             Cause::Full => 74,
             Cause::Prefilter(_) | Cause::MapSaysMode => 76,
             Cause::NoElbow => 79,
-            Cause::Hop(_) => 77,
+            Cause::Hop(_) => 85,
         }
     }
 }

@@ -295,6 +295,13 @@ const COMMANDS: &[Row] = &[
         &["ok", "<Idle|MPos:200.000,0.000"],
     ),
     row(
+        "M103",
+        "pick-and-place move: up, across and down again",
+        THERE,
+        "M103 X210 Z5 Q30 R60 P0.1 K4000 @stop",
+        &["ok", "<Idle|MPos:210.000,0.000,5.000"],
+    ),
+    row(
         "N… *…",
         "line number and checksum",
         NONE,
@@ -684,6 +691,7 @@ const REFUSALS: &[Row] = &[
     row("error:77", "", NONE, "$11=-1", &["error:77"]),
     row("error:78", "", NONE, "$frequency=1.5", &["error:78"]),
     row("error:80", "", NONE, "G64 P1 Q50", &["error:80"]),
+    row("error:85", "", THERE, "M103 X210 Q50 R40", &["error:85"]),
 ];
 
 const ALARMS: &[Row] = &[

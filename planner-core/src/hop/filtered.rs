@@ -6,6 +6,19 @@ use crate::prefilter::{Prefilter, Terms, boxes, terms};
 /// Steps of halving: to a microsecond within a minute.
 const HALVINGS: u32 = 26;
 
+/// When a ramp has come so far behind a prefilter, or behind none, in seconds since its begin.
+///
+/// Not inlined, so that the terms are on the stack for a moment only.
+#[inline(never)]
+pub(super) fn times_s<const N: usize>(
+    ramp: &Ramp,
+    prefilter: Option<&Prefilter>,
+    progress: [f64; N],
+) -> [f64; N] {
+    let filtered = Filtered::new(ramp, prefilter);
+    progress.map(|progress| filtered.time_of(progress))
+}
+
 /// A [`Ramp`] behind a prefilter, or behind none.
 ///
 /// ```text
@@ -13,7 +26,7 @@ const HALVINGS: u32 = 26;
 /// ```
 /// with the prefilter's impulses and the edges of its boxes as `b_k`, and the eight edges of the
 /// ramp's boxes in the inner sum.
-pub(super) struct Filtered {
+struct Filtered {
     /// Those of the prefilter's ramp response.
     terms: Terms,
     boxes_s: [f64; 3],
@@ -24,7 +37,7 @@ pub(super) struct Filtered {
 
 impl Filtered {
     /// What the prefilter makes of a ramp.
-    pub fn new(ramp: &Ramp, prefilter: Option<&Prefilter>) -> Self {
+    fn new(ramp: &Ramp, prefilter: Option<&Prefilter>) -> Self {
         let boxes_s = ramp.boxes_s();
         let stages = prefilter.map_or(&[][..], Prefilter::stages);
         Self {
@@ -37,7 +50,7 @@ impl Filtered {
     }
 
     /// How far it has come, from 0 to 1.
-    pub fn at(&self, time_s: f64) -> f64 {
+    fn at(&self, time_s: f64) -> f64 {
         if time_s >= self.end_s {
             return 1.0;
         }
@@ -64,7 +77,7 @@ impl Filtered {
     }
 
     /// When it has come so far, to a microsecond; late rather than early.
-    pub fn time_of(&self, progress: f64) -> f64 {
+    fn time_of(&self, progress: f64) -> f64 {
         if progress <= 0.0 {
             return 0.0;
         }
@@ -81,11 +94,6 @@ impl Filtered {
             }
         }
         after
-    }
-
-    /// When it has ended.
-    pub fn end_s(&self) -> f64 {
-        self.end_s
     }
 }
 

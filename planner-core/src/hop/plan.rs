@@ -1,6 +1,6 @@
 //! When a hop goes up, across and down.
 
-use super::filtered::Filtered;
+use super::filtered::times_s;
 use super::{HopAxes, HopConfig, HopError, Ramp, RawHop};
 use crate::pose::Pose;
 use crate::prefilter::Prefilter;
@@ -101,19 +101,16 @@ pub fn plan(
     );
     let bent = share(tolerance_mm, across_mm).min(1.0);
 
-    let moved = Filtered::new(&across, over_across);
-    let (first_s, last_s) = (moved.time_of(bent), moved.time_of(1.0 - bent));
-    let raw_up_s = Filtered::new(&up, None).time_of(risen);
-    let risen_up = Filtered::new(&up, over_all);
-    let up_s = risen_up.time_of(risen);
+    let [first_s, last_s] = times_s(&across, over_across, [bent, 1.0 - bent]);
+    let [raw_up_s] = times_s(&up, None, [risen]);
+    let [up_s, top_s] = times_s(&up, over_all, [risen, 1.0]);
     let across_begins = ticks(raw_up_s.max(up_s - first_s));
 
-    let raw_down_s = Filtered::new(&down, None).time_of(lowered);
-    let down_s = Filtered::new(&down, over_all).time_of(lowered);
+    let [raw_down_s] = times_s(&down, None, [lowered]);
+    let [down_s] = times_s(&down, over_all, [lowered]);
     let raw_last_s = f64::from(across.ticks()) * TICK_S;
     let after_s = (raw_last_s - raw_down_s).max(last_s - down_s);
-    let down_begins =
-        ticks(f64::from(across_begins) * TICK_S + after_s).max(ticks(risen_up.end_s()));
+    let down_begins = ticks((f64::from(across_begins) * TICK_S + after_s).max(top_s));
 
     let bits = |mm: f64| libm::round(mm * f64::from(1 << 19)) as i32;
     let up_bits = bits(up_mm);

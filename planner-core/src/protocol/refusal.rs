@@ -150,6 +150,10 @@ pub const ERRORS: [(u8, &str); 51] = [
     ),
     (79, "This robot has no elbow: leave out M101 and M102"),
     (80, "G64 takes either P in mm or Q of 0 to 100 percent"),
+    (
+        85,
+        "The hop cannot be planned: check its height, rise, tolerance and acceleration",
+    ),
 ];
 
 /// The sentence for an `error:N`.
