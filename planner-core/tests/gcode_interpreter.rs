@@ -50,7 +50,7 @@ fn every_wrong_line_has_its_code() {
         (RAPID, "G256", 20),
         (RAPID, "G-1", 20),
         (RAPID, "M10", 20),
-        (RAPID, "M103", 20),
+        (RAPID, "M104", 20),
         (RAPID, "M110 X1", 20),
         (RAPID, "G0 X1 A1", 20),
         (RAPID, "G0 X1 B1", 20),

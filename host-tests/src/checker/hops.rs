@@ -181,7 +181,8 @@ mod tests {
             [100.0, 0.0, 30.0],
             [100.0, 0.0, 10.0],
         ];
-        assert_eq!(vertical_deviations_mm(&hops, &rows(&straight)), [0.0]);
+        let found = vertical_deviations_mm(&hops, &rows(&straight))[0];
+        assert!(found < 2.0 * RESOLUTION_MM);
         let mut early = straight;
         early[1] = [3.0, 4.0, 19.0];
         let found = vertical_deviations_mm(&hops, &rows(&early))[0];
@@ -190,7 +191,8 @@ mod tests {
         assert!((found - expected).abs() < 2.0 * RESOLUTION_MM);
         let mut late = straight;
         late[3] = [100.0, 2.0, 30.0];
-        assert_eq!(vertical_deviations_mm(&hops, &rows(&late)), [2.0]);
+        let found = vertical_deviations_mm(&hops, &rows(&late))[0];
+        assert!((found - 2.0).abs() < 2.0 * RESOLUTION_MM);
         assert!(vertical_deviations_mm(&hops, &rows(&straight[1..])).is_empty());
     }
 }
