@@ -377,13 +377,11 @@ impl<'q> Planner<'q> {
                 folded = change.as_ref().map(|change| change.pose);
                 queued |= self.change_elbow(*elbow, change.as_ref());
             }
-            Some(RobotChange::Hop(order)) => {
-                let hop = self.checked_hop(&self.robot.arm, order)?;
-                queued |= self.schedule.hop(&hop, order.line);
-            }
-            None => {}
+            Some(RobotChange::Hop(_)) | None => {}
         }
-        let moves_tool = command.dwell_s.is_some() || command.moves().next().is_some();
+        let hop = command.hop();
+        let moves_tool =
+            command.dwell_s.is_some() || command.moves().next().is_some() || hop.is_some();
         if moves_tool && self.joints.take().is_some() {
             let position = self.interpreter.modal().position();
             queued |= self
@@ -395,6 +393,9 @@ impl<'q> Planner<'q> {
         }
         if let Some(duration_s) = command.dwell_s {
             queued |= self.stand_still(f64::from(duration_s));
+        }
+        if let Some(order) = hop {
+            queued |= self.plan_hop(order)?;
         }
         for (order, timing) in command.moves().zip(&timings) {
             queued |= timing.duration_s > 0.0 && self.plan_move(order, timing);
@@ -416,6 +417,12 @@ impl<'q> Planner<'q> {
             offsets_stored: interpreted.stores_offsets(),
             ended: command.flow == Some(ProgramFlow::End),
         })
+    }
+
+    /// Queues a pick-and-place move, with the prefilter that is in force.
+    fn plan_hop(&mut self, order: &HopMove) -> Result<bool, Cause> {
+        let hop = self.checked_hop(&self.robot.arm, order)?;
+        Ok(self.schedule.hop(&hop, order.line))
     }
 
     /// Queues a move, with the prefilters that the map asks for.

@@ -42,6 +42,15 @@ impl Command {
     pub fn moves(&self) -> impl Iterator<Item = &Move> {
         self.via.iter().chain(&self.motion)
     }
+
+    /// The pick-and-place move.
+    #[must_use]
+    pub const fn hop(&self) -> Option<&HopMove> {
+        match &self.robot {
+            Some(RobotChange::Hop(hop)) => Some(hop),
+            Some(RobotChange::Prefilter(_) | RobotChange::Elbow(_)) | None => None,
+        }
+    }
 }
 
 /// What M0, M2 and M30 do to the program.
