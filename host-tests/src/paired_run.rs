@@ -3,6 +3,7 @@
 use anyhow::Result;
 use planner_core::prefilter::Kind;
 
+use crate::plant::PayloadConfig;
 use crate::progress::Progress;
 use crate::scenario::{Outcome, Scenario};
 use crate::summary::Summary;
@@ -16,6 +17,8 @@ pub struct PairedRun {
     pub unfiltered: Outcome,
     /// The run's figures.
     pub summary: Summary,
+    /// What swings under the tool, if anything does.
+    pub payload: Option<PayloadConfig>,
 }
 
 impl PairedRun {
@@ -34,6 +37,7 @@ impl PairedRun {
             outcome,
             unfiltered,
             summary,
+            payload: scenario.settings.plant.payload,
         })
     }
 }

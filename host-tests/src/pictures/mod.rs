@@ -6,6 +6,7 @@
 mod canvas;
 mod feedrate;
 mod path;
+mod payload;
 mod polyline;
 mod profile;
 mod vibration;
@@ -20,11 +21,15 @@ use crate::paired_run::PairedRun;
 /// # Errors
 /// Never in practice: the drawing goes to memory.
 pub fn draw(run: &PairedRun) -> Result<Vec<(&'static str, String)>> {
-    Ok(vec![
+    let mut pictures = vec![
         ("path.svg", path::draw(run)?),
         ("feedrate.svg", feedrate::draw(run)?),
         ("vibration.svg", vibration::draw(run)?),
-    ])
+    ];
+    if let Some(config) = &run.payload {
+        pictures.push(("payload.svg", payload::draw(run, config)?));
+    }
+    Ok(pictures)
 }
 
 /// Draws the picture of a profile.
