@@ -64,7 +64,8 @@ impl Hop {
 /// behind the prefilter; with the third, `T↑` the end of *up*, the hop rises as high as it is
 /// said to, and *up* and *down* do not add up to more than the acceleration.
 ///
-/// Two million instructions on a Cortex-M4F with a prefilter of two impulses, on all axes.
+/// By the count of its operations some two million instructions on a Cortex-M4F, with a prefilter
+/// of two impulses on all axes; in proportion to the kinks of its response.
 ///
 /// # Errors
 /// [`HopError`] names the value that is out of range.

@@ -39,7 +39,7 @@ impl RawHop {
 
     /// The raw point at a time since the begin, in bits of a pose: exactly the target at the end.
     ///
-    /// Some 400 instructions on a Cortex-M4F.
+    /// Constant cost: three progresses and six products of 64 bits.
     #[must_use]
     pub fn point(&self, segment: &RawSegment, elapsed: TickTime) -> [i32; AXES] {
         let since = |ticks: u32| elapsed - (TickTime::from(ticks) << 32);
