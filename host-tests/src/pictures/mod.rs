@@ -4,11 +4,14 @@
 //! tolerances are drawn dashed in green.
 
 mod canvas;
+mod comparison;
 mod feedrate;
 mod path;
 mod polyline;
 mod profile;
 mod vibration;
+
+pub use comparison::ShownMotion;
 
 use anyhow::Result;
 
@@ -25,6 +28,14 @@ pub fn draw(run: &PairedRun) -> Result<Vec<(&'static str, String)>> {
         ("feedrate.svg", feedrate::draw(run)?),
         ("vibration.svg", vibration::draw(run)?),
     ])
+}
+
+/// Draws motions side by side.
+///
+/// # Errors
+/// Never in practice: the drawing goes to memory.
+pub fn draw_comparison(title: &str, subtitle: &str, motions: &[ShownMotion<'_>]) -> Result<String> {
+    comparison::draw(title, subtitle, motions)
 }
 
 /// Draws the picture of a profile.
