@@ -14,7 +14,7 @@ use planner_core::corner::{self, CornerRule, Side};
 use planner_core::gcode::{Defaults, Interpreter, Line};
 use planner_core::motion::{DelayLines, Motion, MotionState, Order};
 use planner_core::orientation::Orientation;
-use planner_core::overlap::{Method, Move, Segment, SpeedCurve, ToolPose, plan};
+use planner_core::overlap::{Method, Move, Segment, SpeedCurve, ToolPose, ToolState, plan};
 use planner_core::planner::Planner;
 use planner_core::prefilter::{Kind, PrefilterConfig};
 use planner_core::protocol::{Controller, Identity, Report, Settings, Step};
@@ -277,7 +277,8 @@ impl Bench {
         cost
     }
 
-    /// A corner between two tools that move and turn: its plan, and the dearest instant of it.
+    /// A corner of a tool that moves and turns: its plan, the dearest instant of it, and what the
+    /// bits of all instants come to.
     fn overlap(&mut self) {
         let pose = |x: f64, y: f64, angle_deg: f64| ToolPose {
             position_mm: [x, y, 0.0],
@@ -312,9 +313,27 @@ impl Bench {
         }
         let mut moves = [Move::new(first, rule), Move::new(second, rule)];
         let plan = plan(curve, Method::ClosedForm, &mut moves);
-        let instants = (0..100).map(|k| plan.cycle_s() * f64::from(k) / 100.0);
-        let cost = instants.map(|t| self.count(|| plan.at(black_box(t)))).max();
-        self.print(format_args!("overlap/instant"), cost.unwrap_or(0));
+        let mut cost = 0;
+        let mut bits = 0;
+        for k in 0..100 {
+            let t = plan.cycle_s() * f64::from(k) / 100.0;
+            let mut state = ToolState::default();
+            cost = cost.max(self.count(|| state = plan.at(black_box(t))));
+            let orientation = state.pose.orientation;
+            for value in [
+                state.pose.position_mm[1],
+                state.acceleration_mm_s2[0],
+                orientation.a_deg,
+                orientation.b_deg,
+                orientation.c_deg,
+                state.euler_rates.a_deg_s,
+            ] {
+                let value = value.to_bits();
+                bits = (bits ^ value as u32 ^ (value >> 32) as u32).rotate_left(5);
+            }
+        }
+        self.print(format_args!("overlap/instant"), cost);
+        self.print(format_args!("overlap/bits"), bits);
     }
 
     /// The dearest corner over angles, feedrates, tolerances, lines and arcs.

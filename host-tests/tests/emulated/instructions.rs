@@ -5,6 +5,46 @@ use std::sync::OnceLock;
 
 use crate::support::{images, installed};
 use host_tests::emulator::measure_instructions;
+use planner_core::corner::CornerRule;
+use planner_core::orientation::Orientation;
+use planner_core::overlap::{Method, Move, Segment, SpeedCurve, ToolPose, plan};
+
+/// What the bits of a motion that turns come to on this machine; the image does the same.
+fn bits_of_a_turning_tool() -> u32 {
+    let pose = |x: f64, y: f64, angle_deg: f64| ToolPose {
+        position_mm: [x, y, 0.0],
+        orientation: Orientation::new(angle_deg, 20.0, -angle_deg),
+    };
+    let points = [
+        pose(0.0, 0.0, 10.0),
+        pose(50.0, 0.0, 30.0),
+        pose(50.0, 50.0, -15.0),
+    ];
+    let mut moves: Vec<_> = points
+        .windows(2)
+        .map(|pair| Segment::new(&pair[0], &pair[1], 150.0, 500.0).unwrap())
+        .map(|segment| Move::new(segment, CornerRule::ToleranceMm(1.0)))
+        .collect();
+    let curve = SpeedCurve::s_curve(0.125).unwrap();
+    let plan = plan(curve, Method::ClosedForm, &mut moves);
+    let mut bits = 0_u32;
+    for k in 0..100 {
+        let state = plan.at(plan.cycle_s() * f64::from(k) / 100.0);
+        let orientation = state.pose.orientation;
+        for value in [
+            state.pose.position_mm[1],
+            state.acceleration_mm_s2[0],
+            orientation.a_deg,
+            orientation.b_deg,
+            orientation.c_deg,
+            state.euler_rates.a_deg_s,
+        ] {
+            let value = value.to_bits();
+            bits = (bits ^ value as u32 ^ (value >> 32) as u32).rotate_left(5);
+        }
+    }
+    bits
+}
 
 /// The counts, measured once.
 fn counts() -> Option<&'static BTreeMap<String, u64>> {
@@ -128,6 +168,12 @@ fn planning_stays_ahead_at_a_thousand_segments_a_second() {
             );
         }
     }
+}
+
+#[test]
+fn a_tool_that_moves_and_turns_has_the_same_bits() {
+    let Some(counts) = counts() else { return };
+    assert_eq!(counts["overlap/bits"], u64::from(bits_of_a_turning_tool()));
 }
 
 #[test]
