@@ -5,6 +5,7 @@ use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
 
+use host_tests::checker::matching::distance_to_chord;
 use host_tests::machine::Machine;
 use host_tests::oracle::rotation::{
     Matrix, about, angles_deg, axis_and_angle_deg, matrix, product, turn_deg,
@@ -12,12 +13,15 @@ use host_tests::oracle::rotation::{
 use host_tests::oracle::{self, Geometry, Prefilter, Schedule};
 use host_tests::program_file::ProgramFile;
 use host_tests::progress::Progress;
+use host_tests::random_program::{Shape, random_program};
 use host_tests::robot_file::RobotSettings;
 use host_tests::scenario::Scenario;
 use host_tests::tool_path::{Measured, ToolPath};
 use host_tests::trace::PlantKind;
+use host_tests::vector::xyz;
 use planner_core::corner::CornerRule;
 use planner_core::overlap::{Demand, Method, SpeedCurve};
+use planner_core::prefilter::Kind;
 
 /// `T_rr`, in seconds.
 const BOX_S: f64 = 0.125;
@@ -338,7 +342,7 @@ fn the_setpoints_of_a_scara_miss_each_corner_by_its_tolerance() {
 fn a_given_overlap_runs_as_given() {
     let run = |program: &str, prefilter: &str, percent: f32| {
         let mut settings = RobotSettings::load(None).unwrap();
-        let kind = planner_core::prefilter::Kind::from_name(prefilter).unwrap();
+        let kind = Kind::from_name(prefilter).unwrap();
         settings.robot.prefilter.kind = kind;
         settings.robot.prefilter.frequency_hz = 8.0;
         settings.robot.prefilter.damping = 0.0;
@@ -422,6 +426,54 @@ fn a_tolerance_behind_given_overlaps_is_kept() {
         "{} {least_s}",
         outcome.cycle_time_s
     );
+}
+
+/// Tolerances, exact stops and given overlaps in turn on random programs, arcs among them: what has
+/// a tolerance keeps it, and everything ends at rest at the programmed point.
+#[test]
+fn tolerances_are_kept_between_given_overlaps_on_random_programs() {
+    let mut judged = 0;
+    for seed in 0..24_u64 {
+        let mut settings = RobotSettings::load(None).unwrap();
+        let robot = &mut settings.robot;
+        robot.prefilter.kind = [Kind::Fir, Kind::FirZvd, Kind::SCurve][seed as usize % 3];
+        robot.corner_overlap_percent = [10.0, 50.0, 100.0, 100.0][seed as usize % 4];
+        let shape = Shape {
+            longest_mm: if seed % 2 == 0 { 5.0 } else { 80.0 },
+            ..Shape::default()
+        };
+        let scenario = Scenario {
+            program: ProgramFile {
+                name: format!("seed {seed}"),
+                text: random_program(seed, shape),
+            },
+            settings,
+            plant: PlantKind::Ideal,
+            machine: Machine::Host,
+        };
+        let outcome = scenario.run(Progress::Hidden).unwrap();
+        let (_, report) = outcome.checked.unwrap();
+        assert!(report.drift_mm < 2e-6, "seed {seed}: {}", report.drift_mm);
+        // given overlaps leave the path by millimetres, so that passages cannot be told apart along
+        // it: judged is whether the command comes to the corner at all
+        let trace: Vec<_> = outcome.trace.poses().into_iter().map(xyz).collect();
+        for corner in &report.corners {
+            if corner.tolerance_mm.is_infinite() {
+                continue;
+            }
+            judged += 1;
+            let chords = trace.windows(2);
+            let miss_mm = chords
+                .map(|pair| distance_to_chord(corner.point_mm, pair[0], pair[1]))
+                .fold(f64::INFINITY, f64::min);
+            assert!(
+                miss_mm <= corner.tolerance_mm + 1e-3,
+                "seed {seed}: {miss_mm} {corner:?}"
+            );
+        }
+    }
+    println!("{judged} corners");
+    assert!(judged > 300, "{judged}");
 }
 
 /// The largest `τ` for which `is_within` holds.

@@ -244,6 +244,10 @@ fn atan2_deg(y: f64, x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kinematics::Curve;
+    use crate::path::{PathSegment, Shape};
+    use crate::pose::Pose;
+    use crate::units::{AngleDeg, LengthMm};
     use proptest::prelude::*;
 
     type Matrix = [[f64; 3]; 3];
@@ -350,6 +354,20 @@ mod tests {
             let found = rotation.at(fraction);
             prop_assert!(found.a_deg.abs() < 1e-9 && found.b_deg.abs() < 1e-9);
             prop_assert!(difference(&matrix(&found), &matrix(&on_the_way)) < 1e-12);
+            // the yaw of a segment as the planner walks it, in 2^-19 °
+            let at = |c_deg: f64| Pose {
+                x: LengthMm::from_num(200),
+                c: AngleDeg::from_num(c_deg),
+                ..Pose::default()
+            };
+            let path = PathSegment {
+                start: at(from),
+                target: at(from + turn),
+                shape: Shape::Line,
+            };
+            let [.., c_deg] = path.pose(fraction);
+            let off = (found.c_deg - c_deg + 180.0).rem_euclid(360.0) - 180.0;
+            prop_assert!(off.abs() < 4e-6, "{off}");
             let rates = rotation.rates(fraction, 50.0);
             let signed = if turn < 0.0 { -50.0 } else { 50.0 };
             prop_assert!((rates.c_deg_s - signed).abs() < 1e-6);

@@ -10,17 +10,20 @@ use core::hint::black_box;
 
 use firmware::board::{self, Console, Counter, Stopwatch};
 use planner_core::config::{Robot, RobotConfig};
-use planner_core::corner::{self, Side};
+use planner_core::corner::{self, CornerRule, Side};
 use planner_core::gcode::{Defaults, Interpreter, Line};
 use planner_core::motion::{DelayLines, Motion, MotionState, Order};
+use planner_core::orientation::Orientation;
+use planner_core::overlap::{Method, Move, Segment, SpeedCurve, ToolPose, ToolState, plan};
 use planner_core::planner::Planner;
 use planner_core::prefilter::{Kind, PrefilterConfig};
 use planner_core::protocol::{Controller, Identity, Report, Settings, Step};
 use planner_core::queue::SegmentQueue;
 use static_cell::ConstStaticCell;
 
-/// The corner path, arcs in a row with a helix and yaw, and half-millimetre segments.
-const PROGRAMS: [(&str, &str); 3] = [
+/// The corner path, arcs in a row with a helix and yaw, half-millimetre segments, and a circle in
+/// fifths of a millimetre.
+const PROGRAMS: [(&str, &str); 4] = [
     (
         "corner-path",
         include_str!("../../../host-tests/programs/corner-path.gcode"),
@@ -32,6 +35,10 @@ const PROGRAMS: [(&str, &str); 3] = [
     (
         "half-millimetres",
         include_str!("../../../host-tests/programs/half-millimetres.gcode"),
+    ),
+    (
+        "fifth-millimetres",
+        include_str!("../../../host-tests/programs/fifth-millimetres.gcode"),
     ),
 ];
 
@@ -64,22 +71,25 @@ fn main() -> ! {
             ("fir-zvd-0.1s", Kind::FirZvd, 20.0),
             ("fir-zvd-1s", Kind::FirZvd, 2.0),
             ("ei", Kind::Ei, 6.34),
+            ("s-curve", Kind::SCurve, 6.34),
         ] {
             let robot = robot(kind, frequency_hz);
-            let worst = bench.run(&robot, text, filters, 100);
-            bench.print(format_args!("tick/{program}/{filter}"), worst.tick);
-            bench.print(format_args!("line/{program}/{filter}"), worst.line);
+            let cost = bench.run(&robot, text, filters, 100);
+            bench.print(format_args!("tick/{program}/{filter}"), cost.tick);
+            bench.print(format_args!("line/{program}/{filter}"), cost.line);
+            bench.print(format_args!("line-mean/{program}/{filter}"), cost.line_mean);
         }
         let robot = robot(Kind::FirZvd, 6.34);
         for percent in [63, 137] {
-            let worst = bench.run(&robot, text, filters, percent);
-            bench.print(format_args!("tick/{program}/at-{percent}"), worst.tick);
+            let cost = bench.run(&robot, text, filters, percent);
+            bench.print(format_args!("tick/{program}/at-{percent}"), cost.tick);
         }
     }
     let (_, half_millimetres) = PROGRAMS[2];
     let served = bench.serve(&robot(Kind::FirZvd, 6.34), half_millimetres, filters);
     bench.print(format_args!("link/line"), served.line_mean);
     bench.print(format_args!("link/status"), served.status);
+    bench.overlap();
     for kind in Kind::ALL {
         let worst = bench.corners(&robot(kind, 6.34));
         bench.print(format_args!("corner/{}", kind.name()), worst);
@@ -100,11 +110,15 @@ fn robot(kind: Kind, frequency_hz: f32) -> Robot {
     defmt::unwrap!(Robot::new(&config).ok(), "the settings are within range")
 }
 
-/// The dearest of each, in instructions.
+/// What a program costs, in instructions.
 #[derive(Default)]
-struct Worst {
+struct Cost {
+    /// The dearest tick.
     tick: u32,
+    /// The dearest line, from its text to the look-ahead.
     line: u32,
+    /// The mean of the lines that add to the look-ahead.
+    line_mean: u32,
 }
 
 /// What a link costs, in instructions.
@@ -138,15 +152,16 @@ impl Bench {
         instructions
     }
 
-    /// The dearest tick and the dearest line of a program at a feed override.
+    /// Ticks and lines of a program at a feed override.
     fn run(
         &self,
         robot: &Robot,
         program: &str,
         filters: &mut DelayLines,
         feed_percent: u16,
-    ) -> Worst {
-        let mut worst = Worst::default();
+    ) -> Cost {
+        let mut all = Cost::default();
+        let (mut total, mut count) = (0, 0);
         let mut queue = SegmentQueue::new();
         let (producer, consumer) = queue.split();
         let mut planner = Planner::new(robot, producer);
@@ -165,8 +180,12 @@ impl Bench {
                 };
                 let mut accepted = None;
                 let cost = self.count(|| accepted = planner.line(black_box(line).as_bytes()).ok());
-                worst.line = worst.line.max(cost);
+                all.line = all.line.max(cost);
                 let accepted = defmt::unwrap!(accepted, "the program is right");
+                if accepted.queued {
+                    total += cost;
+                    count += 1;
+                }
                 if let Some(pose) = accepted.reference {
                     motion.obey(Order::Place(pose));
                 }
@@ -175,9 +194,10 @@ impl Bench {
             motion.obey(Order::Start);
             let mut state = MotionState::Idle;
             let cost = self.count(|| state = motion.tick().state);
-            worst.tick = worst.tick.max(cost);
+            all.tick = all.tick.max(cost);
             if state == MotionState::Idle && !more {
-                return worst;
+                all.line_mean = total / count;
+                return all;
             }
         }
     }
@@ -255,6 +275,65 @@ impl Bench {
         let cost = self.count(|| is_right = execute(text).is_ok());
         defmt::assert!(is_right, "the line is right");
         cost
+    }
+
+    /// A corner of a tool that moves and turns: its plan, the dearest instant of it, and what the
+    /// bits of all instants come to.
+    fn overlap(&mut self) {
+        let pose = |x: f64, y: f64, angle_deg: f64| ToolPose {
+            position_mm: [x, y, 0.0],
+            orientation: Orientation::new(angle_deg, 20.0, -angle_deg),
+        };
+        let points = black_box([
+            pose(0.0, 0.0, 10.0),
+            pose(50.0, 0.0, 30.0),
+            pose(50.0, 50.0, -15.0),
+        ]);
+        let mut segments = [None, None];
+        let cost = self.count(|| {
+            for (segment, pair) in segments.iter_mut().zip(points.windows(2)) {
+                *segment = Segment::new(&pair[0], &pair[1], 150.0, 500.0).ok();
+            }
+        });
+        self.print(format_args!("overlap/segment"), cost / 2);
+        let [Some(first), Some(second)] = segments else {
+            return;
+        };
+        let Ok(curve) = SpeedCurve::s_curve(0.125) else {
+            return;
+        };
+        let rule = CornerRule::ToleranceMm(1.0);
+        for (name, method) in [
+            ("closed-form", Method::ClosedForm),
+            ("exact", Method::Exact),
+        ] {
+            let mut moves = [Move::new(first, rule), Move::new(second, rule)];
+            let cost = self.count(|| plan(curve, method, black_box(&mut moves)).cycle_s());
+            self.print(format_args!("overlap/corner-{name}"), cost);
+        }
+        let mut moves = [Move::new(first, rule), Move::new(second, rule)];
+        let plan = plan(curve, Method::ClosedForm, &mut moves);
+        let mut cost = 0;
+        let mut bits = 0;
+        for k in 0..100 {
+            let t = plan.cycle_s() * f64::from(k) / 100.0;
+            let mut state = ToolState::default();
+            cost = cost.max(self.count(|| state = plan.at(black_box(t))));
+            let orientation = state.pose.orientation;
+            for value in [
+                state.pose.position_mm[1],
+                state.acceleration_mm_s2[0],
+                orientation.a_deg,
+                orientation.b_deg,
+                orientation.c_deg,
+                state.euler_rates.a_deg_s,
+            ] {
+                let value = value.to_bits();
+                bits = (bits ^ value as u32 ^ (value >> 32) as u32).rotate_left(5);
+            }
+        }
+        self.print(format_args!("overlap/instant"), cost);
+        self.print(format_args!("overlap/bits"), bits);
     }
 
     /// The dearest corner over angles, feedrates, tolerances, lines and arcs.

@@ -1,5 +1,6 @@
 //! `stillpoint compare`: all prefilters side by side.
 
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::thread;
 
@@ -9,14 +10,17 @@ use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{Attribute, Cell, CellAlignment, LineStyle, Table};
 use planner_core::config::{ConfigError, Robot};
 use planner_core::hop::HopAxes;
-use planner_core::prefilter::{Kind, PrefilterError};
+use planner_core::prefilter::{Kind, Mode, PrefilterError};
 use serde::Serialize;
 
 use super::ScenarioArgs;
+use super::output::write_picture;
 use crate::payload_search::{self, Fastest};
+use crate::pictures::{ShownMotion, draw_comparison};
 use crate::progress::Progress;
 use crate::scenario::{Outcome, Scenario};
 use crate::summary::{Figures, Ratios};
+use crate::vector::xyz;
 
 /// Arguments of `compare`.
 #[derive(Args, Debug)]
@@ -24,6 +28,9 @@ use crate::summary::{Figures, Ratios};
 pub struct CompareArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
+    /// Directory for a picture of speed, acceleration and jerk of each.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -37,6 +44,9 @@ pub struct Comparison {
     damping: f32,
     tolerance_mm: f32,
     plant: &'static str,
+    /// The largest feedrate that the program gives; none without the checker's reading of it.
+    #[serde(skip)]
+    feed_mm_s: Option<f64>,
     prefilters: Vec<Row>,
     /// The fastest hops that the payload allows; empty without payload or hops.
     fastest_hops: Vec<Fastest>,
@@ -54,6 +64,9 @@ struct Row {
 
 #[derive(Debug, Serialize)]
 struct Measured {
+    /// Where the tool is commanded to be, until it has come to rest.
+    #[serde(skip)]
+    positions: Vec<[f64; 3]>,
     #[serde(flatten)]
     figures: Figures,
     #[serde(flatten)]
@@ -72,11 +85,22 @@ pub fn execute(args: &CompareArgs) -> Result<String> {
         Progress::Shown
     };
     let comparison = Comparison::run(&scenario, progress)?;
+    let written = args
+        .out
+        .as_deref()
+        .map(|directory| {
+            let picture = comparison.draw(scenario.settings.robot.prefilter.kind)?;
+            write_picture(directory, "prefilters.svg", &picture)
+        })
+        .transpose()?;
     if args.json {
-        Ok(serde_json::to_string_pretty(&comparison)?)
-    } else {
-        Ok(comparison.table())
+        return Ok(serde_json::to_string_pretty(&comparison)?);
     }
+    let mut text = comparison.table();
+    if let Some(path) = written {
+        text += &format!("\n\nLook at:\n  {}", path.display());
+    }
+    Ok(text)
 }
 
 impl Comparison {
@@ -128,11 +152,50 @@ impl Comparison {
             damping: robot.prefilter.damping,
             tolerance_mm: robot.corner_tolerance_mm,
             plant: scenario.plant.name(),
+            feed_mm_s: unfiltered.checked.as_ref().ok().and_then(|(program, _)| {
+                let feeds = program.blocks.iter().filter_map(|block| block.feed_mm_s);
+                feeds.reduce(f64::max)
+            }),
             prefilters: rows
                 .into_iter()
                 .map(|(_, row)| row)
                 .collect::<Result<_>>()?,
         })
+    }
+
+    /// Speed, acceleration and jerk of each prefilter, the robot's own first.
+    ///
+    /// # Errors
+    /// Never in practice: the drawing goes to memory.
+    pub fn draw(&self, own: Kind) -> Result<String> {
+        let feed_mm_s = self.feed_mm_s.unwrap_or(1.0);
+        let mode = Mode {
+            frequency_hz: self.frequency_hz.into(),
+            damping: self.damping.into(),
+        };
+        let period_s = mode.damped_period_s();
+        let mut rows: Vec<_> = self.prefilters.iter().collect();
+        rows.sort_by_key(|row| row.prefilter != own.name());
+        let motions: Vec<_> = rows
+            .into_iter()
+            .filter_map(|row| Some((row.prefilter, row.measured.as_ref()?)))
+            .map(|(name, measured)| ShownMotion {
+                name,
+                positions: &measured.positions,
+                limits: [self.feed_mm_s, None, None],
+                scales: [
+                    feed_mm_s,
+                    feed_mm_s / period_s,
+                    feed_mm_s / period_s / period_s,
+                ],
+            })
+            .collect();
+        let title = format!("{}: prefilters", self.program);
+        let subtitle = format!(
+            "{} Hz, damping {}, corner tolerance {} mm; sizes of the commanded derivatives",
+            self.frequency_hz, self.damping, self.tolerance_mm
+        );
+        draw_comparison(&title, &subtitle, &motions)
     }
 
     /// As a table for a terminal.
@@ -245,7 +308,10 @@ const HEADER: [&str; 10] = [
 impl Row {
     fn cells(&self) -> Vec<String> {
         let mut cells = vec![self.prefilter.to_owned()];
-        let Some(Measured { figures, ratios }) = &self.measured else {
+        let Some(Measured {
+            figures, ratios, ..
+        }) = &self.measured
+        else {
             cells.push("refused".into());
             return cells;
         };
@@ -295,6 +361,13 @@ fn row(scenario: &Scenario, kind: Kind, unfiltered: &Outcome) -> Result<Row> {
         prefilter: kind.name(),
         refused: None,
         measured: Some(Measured {
+            positions: outcome
+                .trace
+                .poses()
+                .into_iter()
+                .map(xyz)
+                .take(outcome.trace.stop() + 1)
+                .collect(),
             figures: Figures::new(&outcome),
             ratios: Ratios::new(&outcome, unfiltered),
         }),

@@ -113,6 +113,18 @@ pub fn percent(fraction: f64) -> String {
     format!("{:.digits$} %", 100.0 * fraction)
 }
 
+/// Writes one picture into a directory; yields its path.
+///
+/// # Errors
+/// A directory or file that cannot be written.
+pub fn write_picture(directory: &Path, name: &str, picture: &str) -> Result<PathBuf> {
+    let at = |path: &Path| format!("{} cannot be written", path.display());
+    fs::create_dir_all(directory).with_context(|| at(directory))?;
+    let path = directory.join(name);
+    fs::write(&path, picture).with_context(|| at(&path))?;
+    Ok(path)
+}
+
 /// Writes trace, summary and pictures; yields their paths.
 ///
 /// # Errors

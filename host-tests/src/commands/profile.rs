@@ -1,9 +1,8 @@
 //! `stillpoint profile`: the profile of a move whose mode changes along its way.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
@@ -12,6 +11,7 @@ use planner_core::posture::{Course, Method, Profile, Zeros};
 use planner_core::prefilter::Mode;
 use serde::Serialize;
 
+use super::output::write_picture;
 use crate::pictures;
 use crate::plant::{self, Answer, Base, Travel};
 
@@ -104,7 +104,10 @@ pub fn execute(args: &ProfileArgs) -> Result<String> {
     let written = args
         .out
         .as_deref()
-        .map(|directory| write_picture(directory, &simulated))
+        .map(|directory| {
+            let picture = pictures::draw_profile(&simulated)?;
+            write_picture(directory, "profile.svg", &picture)
+        })
         .transpose()?;
     if args.json {
         return Ok(serde_json::to_string(&simulated.figures())?);
@@ -250,11 +253,3 @@ const HEADER: [&str; 6] = [
     "overshoot",
     "settling\ns",
 ];
-
-fn write_picture(directory: &Path, simulated: &SimulatedMove) -> Result<PathBuf> {
-    let at = |path: &Path| format!("{} cannot be written", path.display());
-    fs::create_dir_all(directory).with_context(|| at(directory))?;
-    let path = directory.join("profile.svg");
-    fs::write(&path, pictures::draw_profile(simulated)?).with_context(|| at(&path))?;
-    Ok(path)
-}

@@ -40,6 +40,30 @@ pub struct Entry {
     pub method: &'static str,
     /// What came of it.
     pub figures: Figures,
+    /// The command, sampled every [`STEP_S`].
+    pub positions: Vec<Point>,
+    /// Limits along the path that the method was given.
+    pub limits: Option<Limits>,
+}
+
+/// Largest acceleration of the tool after the stop, in mm/s², that counts as still.
+pub const STILL_MM_S2: f64 = 10.0;
+
+impl Entry {
+    /// Whether it keeps a corner tolerance and leaves the tool still.
+    #[must_use]
+    pub fn is_fit(&self, tolerance_mm: f64) -> bool {
+        // samples of a millisecond cut a corner where the velocity jumps
+        self.figures.corner_error_mm <= tolerance_mm + 1e-3
+            && self.figures.residual_mm_s2 <= STILL_MM_S2
+    }
+}
+
+/// The fastest of those that keep the corner tolerance and leave the tool still.
+#[must_use]
+pub fn fastest_fit(entries: &[Entry], tolerance_mm: f64) -> Option<&Entry> {
+    let fit = entries.iter().filter(|entry| entry.is_fit(tolerance_mm));
+    fit.min_by(|a, b| a.figures.cycle_time_s.total_cmp(&b.figures.cycle_time_s))
 }
 
 /// Runs a program by every method, on a mode in each Cartesian axis.
@@ -61,47 +85,66 @@ pub fn compare(scenario: &Scenario) -> Result<Vec<Entry>> {
         let trace = scenario.run_with(kind, Progress::Hidden)?.trace;
         Ok(trace.poses().into_iter().map(xyz).collect())
     };
-    let runs: Vec<(&'static str, Vec<Point>)> = vec![
-        ("Stillpoint, FIR-ZVD", ours(Kind::FirZvd)?),
-        ("Stillpoint, FIR-ZV", ours(Kind::FirZv)?),
+    let in_10_ms = limits.with_jerk_time(0.01);
+    let in_a_period = limits.with_jerk_time(period_s);
+    // the peaks of two boxes of a period: an S-curve with its zeros at the mode
+    let of_boxes = Limits::of(&task, &adai).with_jerk_time(period_s);
+    let runs: Vec<(&'static str, Vec<Point>, Option<Limits>)> = vec![
+        ("Stillpoint, FIR-ZVD", ours(Kind::FirZvd)?, None),
+        ("Stillpoint, FIR-ZV", ours(Kind::FirZv)?, None),
         (
             "hybrid [Yeh26], overlap rounded up",
             overlap::rounded_up(&task, &hybrid),
+            None,
         ),
         (
             "VPO [Li23], boxes of a period",
             overlap::within_tolerance(&task, &s_curve),
+            None,
         ),
         (
             "ADAI [Li23], box of a period",
             overlap::without_dwell(&task, &adai, 1.0),
+            None,
         ),
         (
             "ADAI, feed lowered to the tolerance",
             overlap::without_dwell_within_tolerance(&task, &adai),
+            None,
         ),
         (
             "junction velocity, ZVD for each axis",
             junction::run(&task, &shaper, limits.acceleration_mm_s2, task.tolerance_mm),
+            Some(limits),
         ),
         (
             "junction velocity, tuned to the tolerance",
             junction::within_tolerance(&task, &shaper, limits.acceleration_mm_s2),
+            Some(limits),
         ),
         (
             "full stops, jerk in 10 ms",
-            full_stops::run(&task, &limits.with_jerk_time(0.01))?,
+            full_stops::run(&task, &in_10_ms)?,
+            Some(in_10_ms),
         ),
         (
             "full stops, jerk tuned to the mode",
-            full_stops::run(&task, &limits.with_jerk_time(period_s))?,
+            full_stops::run(&task, &in_a_period)?,
+            Some(in_a_period),
+        ),
+        (
+            "full stops, both limits tuned to the mode",
+            full_stops::run(&task, &of_boxes)?,
+            Some(of_boxes),
         ),
     ];
     runs.into_iter()
-        .map(|(method, positions)| {
+        .map(|(method, positions, limits)| {
             Ok(Entry {
                 method,
                 figures: Figures::of(&task, &positions)?,
+                positions,
+                limits,
             })
         })
         .collect()

@@ -4,12 +4,15 @@
 //! tolerances are drawn dashed in green.
 
 mod canvas;
+mod comparison;
 mod feedrate;
 mod path;
 mod payload;
 mod polyline;
 mod profile;
 mod vibration;
+
+pub use comparison::ShownMotion;
 
 use anyhow::Result;
 
@@ -30,6 +33,14 @@ pub fn draw(run: &PairedRun) -> Result<Vec<(&'static str, String)>> {
         pictures.push(("payload.svg", payload::draw(run, config)?));
     }
     Ok(pictures)
+}
+
+/// Draws motions side by side.
+///
+/// # Errors
+/// Never in practice: the drawing goes to memory.
+pub fn draw_comparison(title: &str, subtitle: &str, motions: &[ShownMotion<'_>]) -> Result<String> {
+    comparison::draw(title, subtitle, motions)
 }
 
 /// Draws the picture of a profile.

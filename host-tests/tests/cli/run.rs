@@ -5,7 +5,7 @@ use std::fs;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::{corner_path, json, near, number, stillpoint};
+use super::{corner_path, json, near, number, programs, stillpoint};
 
 #[test]
 fn without_arguments_it_tells_and_draws() {
@@ -237,5 +237,23 @@ fn a_program_that_the_checker_cannot_read_runs_without_its_figures() {
 fn help_and_version_work() {
     for args in [&["--help"][..], &["run", "--help"], &["--version"]] {
         stillpoint(args).assert().success();
+    }
+}
+
+#[test]
+fn comparisons_draw_speed_acceleration_and_jerk() {
+    let here = TempDir::new().unwrap();
+    let out = here.path().to_str().unwrap();
+    let program = programs().join("rectangle.gcode").display().to_string();
+    for (command, name, rows) in [
+        ("methods", "methods.svg", 11),
+        ("compare", "prefilters.svg", 8),
+    ] {
+        json(&[command, &program, "--out", out, "--json"]);
+        let picture = fs::read_to_string(here.path().join(name)).unwrap();
+        for what in ["speed", "acceleration", "jerk"] {
+            let panels = picture.matches(&format!("{what}\n")).count();
+            assert_eq!(panels, rows, "{name}: {what}");
+        }
     }
 }

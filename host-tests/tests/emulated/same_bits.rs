@@ -48,6 +48,13 @@ G1 X250 Y-60 F9000
 G4 P0.1234
 G64 P0.05
 X200 Y-80.5
+G64 Q60 (a given overlap)
+X210 Y-70
+X220 Y-80
+G64 Q100
+X230 Y-70
+G3 X240 Y-60 R10
+X230 Y-50 R10
 M0
 G64
 G20 G1 X9.5 Y-1 F300
@@ -310,7 +317,7 @@ fn half_millimetre_chords_have_the_same_bits() {
 
 #[test]
 fn every_word_has_the_same_bits() {
-    for kind in [Kind::FirZvd, Kind::Ei] {
+    for kind in [Kind::FirZvd, Kind::Ei, Kind::SCurve] {
         let mut config = RobotConfig::default();
         config.prefilter.kind = kind;
         if ticks_alike(&config, EVERY_WORD).is_none() {
