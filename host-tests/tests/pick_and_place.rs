@@ -21,7 +21,7 @@ use planner_core::queue::SegmentQueue;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-const ROBOT: &str = "robots/scara-400-400-payload.toml";
+const ROBOT: &str = "robots/delta-800-payload.toml";
 const PROGRAM: &str = "programs/hop.gcode";
 
 /// Accelerations of the published motion in mm/s², flexible and stiff gripper.
@@ -141,7 +141,7 @@ fn small_swings_obey_the_law_of_the_shaper() {
     // across only: even so slow a rise would couple with the small residual
     let flat = |frequency_hz| {
         let mut scenario = published(PayloadConfig::FLEXIBLE, frequency_hz);
-        scenario.program.text = "G0 X-350 Y400 Z0\nM103 X350 Q0 R0.001\nM2".into();
+        scenario.program.text = "G0 X-350 Y0 Z-767\nM103 X350 Q0 R0.001\nM2".into();
         scenario
     };
     let unshaped = run(&flat(2.4727), HopAxes::None, acceleration).unwrap();
@@ -221,9 +221,9 @@ fn vertical_parts_are_vertical_whatever_is_filtered() {
         let mut place = || {
             let coordinate = |value: f64| (value * 1000.0).round() / 1000.0;
             [
-                coordinate(random.random_range(-300.0..300.0)),
-                coordinate(random.random_range(300.0..500.0)),
-                coordinate(random.random_range(-100.0..0.0)),
+                coordinate(random.random_range(-350.0..350.0)),
+                coordinate(random.random_range(-350.0..350.0)),
+                coordinate(random.random_range(-820.0..-740.0)),
             ]
         };
         let [[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]] = [place(), place(), place()];
@@ -273,7 +273,7 @@ fn a_hop_is_held_gently_on_unfiltered_axes() {
     let mut settings = flexible().settings.robot;
     settings.hop.axes = HopAxes::None;
     let robot = Robot::new(&settings).unwrap();
-    let program = "G0 X-350 Y400 Z-100\nM103 X350\nM2";
+    let program = "G0 X-350 Y0 Z-767\nM103 X350\nM2";
     let (acceleration, speed) = (5000.0, (5000.0 * 700.0_f64 / 1.2).sqrt());
     for at in (20..1100).step_by(90) {
         let rows = command(&robot, program, Meanwhile::Held(at, at + 400));
@@ -294,7 +294,7 @@ fn a_hop_is_held_gently_on_unfiltered_axes() {
             longest_stand > 250,
             "held at {at}: stood for {longest_stand} ms"
         );
-        assert_eq!(rows[rows.len() - 1].pose[..3], [350.0, 400.0, -100.0]);
+        assert_eq!(rows[rows.len() - 1].pose[..3], [350.0, 0.0, -767.0]);
     }
 }
 
@@ -306,14 +306,14 @@ fn a_hop_that_cannot_be_driven_is_refused() {
         ("M103 X0 Q50 R40", 85),
         ("M103 X0 P0", 85),
         ("M103 X0 R900", 72),
-        ("M103 X0 Y900", 71),
+        ("M103 X0 Y900", 70),
         ("M103 X0 F100", 36),
         ("M103 X0 G1", 65),
     ] {
         let mut queue = SegmentQueue::new();
         let mut filters = Box::new(DelayLines::new());
         let mut controller = Controller::new(&robot, &mut queue, &mut filters);
-        controller.planner().line(b"G0 X-350 Y400 Z-100").unwrap();
+        controller.planner().line(b"G0 X-350 Y0 Z-767").unwrap();
         let error = controller.planner().line(line.as_bytes()).unwrap_err();
         assert_eq!(error.code(), code, "{line}: {error}");
         assert!(controller.is_empty(), "{line}");
