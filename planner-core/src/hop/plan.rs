@@ -6,7 +6,8 @@ use crate::pose::Pose;
 use crate::prefilter::Prefilter;
 use crate::units::{LengthMm, TICK_HZ, TICK_S};
 
-/// What the fixed-point trace and its sampling may add to a deviation: part of the tolerance.
+/// Part of the tolerance that is planned with: the rest is for what the prefilter's integer taps
+/// make of its impulses.
 const TOLERANCE_USED: f64 = 0.98;
 
 /// What the robot allows, whatever is asked for.
@@ -95,7 +96,9 @@ pub fn plan(
     let over_across = (config.axes != HopAxes::None).then_some(prefilter);
     let share = |mm: f64, of_mm: f64| if of_mm > 0.0 { mm / of_mm } else { 1.0 };
     let height_mm = f64::from(config.height_mm);
-    let tolerance_mm = f64::from(config.tolerance_mm) * TOLERANCE_USED;
+    // the trace goes straight from one tick to the next, aside from a curve by up to A T²/8
+    let sampled_mm = acceleration * TICK_S * TICK_S / 8.0;
+    let tolerance_mm = (f64::from(config.tolerance_mm) * TOLERANCE_USED - sampled_mm).max(0.0);
     let (risen, lowered) = (
         share(height_mm, up_mm),
         1.0 - share(height_mm, down_mm).min(1.0),
