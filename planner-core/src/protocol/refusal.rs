@@ -59,7 +59,7 @@ impl fmt::Display for Refusal {
 }
 
 /// What each `error:N` means, as `$EE` lists it.
-pub const ERRORS: [(u8, &str); 51] = [
+pub const ERRORS: [(u8, &str); 52] = [
     (1, "A word begins with something other than a letter"),
     (2, "A letter has no proper number"),
     (3, "There is no such $ command or setting: see $ and $$"),
