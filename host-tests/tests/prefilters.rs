@@ -179,15 +179,13 @@ fn every_prefilter_is_that_of_the_oracle() {
                 .filter(|_| kind.follows_the_mode() && kind != Kind::None);
             assert_eq!(found.is_some(), exact.is_some(), "{kind:?}");
             if let (Some(found), Some(exact)) = (found, exact) {
+                // the core's search ends at four times the nominal frequency
+                let last_hz = 4.0 * mode.frequency_hz;
                 let within = 2e-5 * mode.frequency_hz;
-                assert!(
-                    (found.0 - exact.0).abs() < within,
-                    "{kind:?} {found:?} {exact:?}"
-                );
-                assert!(
-                    (found.1 - exact.1).abs() < within,
-                    "{kind:?} {found:?} {exact:?}"
-                );
+                let case = format!("{kind:?} {found:?} {exact:?}");
+                assert!((found.0 - exact.0).abs() < within, "{case}");
+                let is_beyond = found.1 > last_hz && exact.1 > last_hz;
+                assert!(is_beyond || (found.1 - exact.1).abs() < within, "{case}");
             }
         }
     }
@@ -267,44 +265,30 @@ fn a_second_mode_is_nulled_too() {
 }
 
 #[test]
-fn what_has_no_room_is_refused_by_name() {
-    // custom and its box have 10 kinks, 2-hump EI 4, and two more boxes double them twice
-    let crowded = PrefilterConfig {
+fn the_most_crowded_cascades_have_room() {
+    // 100 kinks each: five impulses a mode, and two boxes
+    let crowded = |kind, second_kind| PrefilterConfig {
         impulses: [0.0, 13.0, 29.0, 47.0, 71.0].map(|time_ms| CustomImpulse {
             time_ms,
             weight: 1.0,
         }),
         second: SecondMode {
-            kind: Kind::FirThreeHumpEi,
+            kind: second_kind,
             frequency_hz: 31.0,
             damping: 0.0,
         },
         smoothing_ms: [7.0, 5.0],
-        ..config(Kind::FirCustom, 17.0, 0.0)
+        ..config(kind, 17.0, 0.0)
     };
-    let said = |config| {
-        Prefilter::new(config)
-            .map(drop)
-            .map_err(|error| error.to_string())
-    };
-    assert_eq!(said(&crowded), Ok(()));
-    let more = PrefilterConfig {
-        second: SecondMode {
-            kind: Kind::FirCustom,
-            ..crowded.second
-        },
-        ..crowded
-    };
-    assert_eq!(said(&more), Ok(()));
-    let most = PrefilterConfig {
-        kind: Kind::ThreeHumpEi,
-        second: SecondMode {
-            kind: Kind::FirCustom,
-            ..crowded.second
-        },
-        ..crowded
-    };
-    assert!(said(&most).is_err_and(|text| text.contains("more than 100 kinks")));
+    for (kind, second_kind) in [
+        (Kind::ThreeHumpEi, Kind::ThreeHumpEi),
+        (Kind::FirCustom, Kind::ThreeHumpEi),
+        (Kind::Custom, Kind::ThreeHumpEi),
+        (Kind::FirZvdd, Kind::FirZvdd),
+        (Kind::SCurve, Kind::SCurve),
+    ] {
+        agrees(&crowded(kind, second_kind));
+    }
 }
 
 proptest! {
@@ -328,10 +312,7 @@ proptest! {
             smoothing_ms: [smoothing1, smoothing2],
             ..config(Kind::ALL[kind], frequency, damping)
         };
-        // what has no room is refused, see above
-        if Prefilter::new(&config).is_ok() {
-            agrees(&config);
-        }
+        agrees(&config);
     }
 
     #[test]
@@ -349,9 +330,7 @@ proptest! {
             smoothing_ms: [smoothing1, 0.0],
             ..config(Kind::ALL[kind], frequency, damping)
         };
-        let Ok(prefilter) = Prefilter::new(&config) else {
-            return Ok(());
-        };
+        let prefilter = Prefilter::new(&config).expect("within range");
         let kernel = Kernel::new(&prefilter).expect("shorter than a second");
         let oracle = oracle(&config);
         // a ramp of 160 mm/s in 2^-19 mm, from rest; it stops after 0.3 s
@@ -504,9 +483,11 @@ fn smoothing_bounds_acceleration_and_jerk() {
             .map(f64::abs)
             .fold(0.0, f64::max);
         let (most, most_jerk) = (feed_mm_s / 0.05, feed_mm_s / (0.05 * 0.02));
-        println!("{kind:?}: {acceleration} of {most}, {jerk} of {most_jerk}");
-        assert!(acceleration < 1.001 * most, "{kind:?}: {acceleration}");
-        assert!(jerk < 1.001 * most_jerk, "{kind:?}: {jerk}");
+        // poses come in 2^-19 mm
+        let rounding = 2.0 / f64::from(1 << 19) / (TICK_S * TICK_S);
+        assert!(acceleration < most + rounding, "{kind:?}: {acceleration}");
+        let most_jerk = most_jerk + 2.0 * rounding / (5.0 * TICK_S);
+        assert!(jerk < most_jerk, "{kind:?}: {jerk} of {most_jerk}");
         // the first impulse alone takes a good part of both
         assert!(
             acceleration > 0.15 * most && jerk > 0.15 * most_jerk,

@@ -31,8 +31,11 @@ pub struct PrefilterArgs {
 #[derive(Serialize)]
 struct Answer {
     length_s: f64,
+    #[serde(skip)]
     centroid_s: f64,
+    #[serde(skip)]
     spread_s: f64,
+    #[serde(skip)]
     boxes_s: Vec<f64>,
     residual_percent: f64,
     band_low_hz: Option<f64>,

@@ -101,6 +101,35 @@ fn prefilter_gives_length_residual_and_band() {
     near(&ei, "band_high_hz", 11.997, 1e-2);
 }
 
+#[test]
+fn prefilter_takes_what_its_name_leaves_open() {
+    let undamped = |flags: &str| {
+        let args = format!("prefilter --frequency 10 --damping 0 --json --prefilter {flags}");
+        json(&args.split(' ').collect::<Vec<_>>())
+    };
+    // EI at 10 %: half the band is acos(1/√5.5) · 2/π of the frequency
+    let ei = undamped("ei --v-tol 0.1");
+    near(&ei, "residual_percent", 10.0, 1e-4);
+    near(&ei, "band_low_hz", 7.195, 1e-3);
+    near(&ei, "band_high_hz", 12.805, 1e-3);
+    let humps = undamped("2HUMP-EI");
+    near(&humps, "residual_percent", 0.0, 1e-6);
+    near(&humps, "band_low_hz", 6.377, 2e-3);
+    near(&humps, "band_high_hz", 13.623, 2e-3);
+    let second = "--mode2-prefilter zvd --mode2-frequency 25 --mode2-damping 0";
+    let both = undamped(&format!("fir-zv {second} --actual-frequency 25"));
+    near(&both, "length_s", 0.19, 1e-9);
+    near(&both, "residual_percent", 0.0, 1e-6);
+    let smooth = undamped("zv --smoothing1-ms 20 --smoothing2-ms 10");
+    near(&smooth, "length_s", 0.08, 1e-8);
+    let list = undamped("custom --impulses 0:1,50:1");
+    near(&list, "residual_percent", 0.0, 1e-6);
+    near(&list, "length_s", 0.05, 1e-8);
+    let jerk = undamped("s-curve --s-curve-feed 80 --s-curve-jerk 5120");
+    near(&jerk, "length_s", 0.25, 1e-9);
+    near(&undamped("box --box-ms 30"), "length_s", 0.03, 1e-8);
+}
+
 fn profile(start: &str, end: &str, method: &str) -> Vec<String> {
     let args = [
         "profile",

@@ -173,7 +173,24 @@ fn compare_shows_all_prefilters() {
     assert_eq!(
         names,
         [
-            "none", "zv", "zvd", "ei", "fir", "fir-zv", "fir-zvd", "s-curve"
+            "none",
+            "zv",
+            "zvd",
+            "ei",
+            "fir",
+            "fir-zv",
+            "fir-zvd",
+            "mzv",
+            "zvdd",
+            "2hump-ei",
+            "3hump-ei",
+            "s-curve",
+            "box",
+            "fir-ei",
+            "fir-mzv",
+            "fir-zvdd",
+            "fir-2hump-ei",
+            "fir-3hump-ei"
         ]
     );
     for row in rows {

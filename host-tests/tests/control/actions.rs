@@ -6,7 +6,7 @@ use planner_core::motion::{DelayLines, MotionState, Order, Setpoint};
 use planner_core::prefilter::{Kind, PrefilterConfig};
 use planner_core::queue::{KERNELS, SegmentQueue};
 
-use crate::support::{CORNER_PATH, is_at_rest, prefilter_line, robot};
+use crate::support::{CORNER_PATH, KINDS, is_at_rest, prefilter_line, robot};
 
 /// Plans with `plan`, then runs what is queued to its end; a pause is not resumed.
 fn run(robot: &Robot, plan: impl FnOnce(&mut Controller<'_>)) -> Vec<Setpoint> {
@@ -34,7 +34,7 @@ fn feed(controller: &mut Controller<'_>, lines: &str) {
 
 #[test]
 fn outputs_switch_when_the_motion_has_settled_at_their_point() {
-    for kind in Kind::ALL {
+    for kind in KINDS {
         let robot = robot(|config| config.prefilter.kind = kind);
         let all = run(&robot, |controller| {
             feed(controller, "G0 X200 Y0\nG1 X210 F6000");

@@ -9,7 +9,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::support::{
-    CORNER_PATH, Orders, TICK_S, allowance_mm, prefilter, report, robot, setpoints, velocities,
+    CORNER_PATH, KINDS, Orders, TICK_S, allowance_mm, prefilter, report, robot, setpoints,
+    velocities,
 };
 
 const FEED_MM_S: f64 = 160.0;
@@ -27,15 +28,15 @@ fn robot_with(kind: Kind) -> Robot {
 /// Every prefilter is held at its share of the instants.
 #[test]
 fn held_at_100_instants_it_stays_on_the_path_and_ends_at_the_same_bits() {
-    for kind in Kind::ALL {
-        hold_at_instants(kind, 100 / Kind::ALL.len() + 1);
+    for kind in KINDS {
+        hold_at_instants(kind, 100 / KINDS.len() + 1);
     }
 }
 
 #[test]
 #[ignore = "long: 500 instants with every prefilter"]
 fn held_at_500_instants_it_stays_on_the_path_and_ends_at_the_same_bits() {
-    for kind in Kind::ALL {
+    for kind in KINDS {
         hold_at_instants(kind, 500);
     }
 }
@@ -181,7 +182,7 @@ fn least_singular_value(l1: f64, l2: f64, elbow_rad: f64) -> f64 {
 /// and the deceleration at most the feedrate over the box.
 #[test]
 fn a_line_is_left_by_the_mean_delay() {
-    for kind in Kind::ALL {
+    for kind in KINDS {
         let robot = robot_with(kind);
         let orders = Orders::from([(800, Order::Hold), (2000, Order::Resume)]);
         let all = setpoints(&robot, "G0 X200 Y-120\nG1 Y150 F9600\nM2", &orders);

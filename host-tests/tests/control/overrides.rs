@@ -7,7 +7,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::support::{
-    CORNER_PATH, Orders, TICK_S, allowance_mm, pose, report, robot, setpoints, top_speed_mm_s,
+    CORNER_PATH, KINDS, Orders, TICK_S, allowance_mm, pose, report, robot, setpoints,
+    top_speed_mm_s,
 };
 
 fn rates(feed_percent: u16, rapid_percent: u8) -> Order {
@@ -103,7 +104,7 @@ fn pauses_and_dwells_follow_none() {
 /// All segments are long and all corners alone, so that the whole path is hurried.
 #[test]
 fn the_corner_path_keeps_its_tolerance_at_every_override() {
-    for kind in Kind::ALL {
+    for kind in KINDS {
         let robot = robot(|config| config.prefilter.kind = kind);
         let mut last_length = usize::MAX;
         for percent in [10, 33, 75, 100, 101, 130, 170, 200] {
@@ -134,7 +135,7 @@ fn the_corner_path_keeps_its_tolerance_at_every_override() {
 /// No allowance for what the trace does within a tick, even where the velocity jumps.
 #[test]
 fn a_corner_of_any_angle_keeps_its_tolerance_when_hurried() {
-    for kind in Kind::ALL {
+    for kind in KINDS {
         let robot = robot(|config| config.prefilter.kind = kind);
         for angle_deg in (3..180).step_by(4) {
             let angle_rad = f64::from(angle_deg).to_radians();
@@ -191,7 +192,7 @@ fn rates_change_on_the_way() {
 /// Full stops stay exact, whenever the raw path arrives within a tick.
 #[test]
 fn exact_stops_stay_exact_under_control() {
-    for (kind, seed) in Kind::ALL.into_iter().zip(0..) {
+    for (kind, seed) in KINDS.into_iter().zip(0..) {
         let robot = robot(|config| {
             config.prefilter.kind = kind;
             config.corner_tolerance_mm = 0.0;

@@ -9,7 +9,7 @@ use planner_core::prefilter::Kind;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::support::{Orders, allowance_mm, report, robot, setpoints, top_speed_mm_s};
+use crate::support::{KINDS, Orders, allowance_mm, report, robot, setpoints, top_speed_mm_s};
 
 const FEED_LIMIT_MM_S: f64 = 400.0;
 
@@ -84,7 +84,7 @@ fn corners_a_filter_apart(seeds: std::ops::Range<u64>) {
     const FEED_MM_S: f64 = 160.0;
     for seed in seeds {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let kind = Kind::ALL[1 + seed as usize % (Kind::ALL.len() - 1)];
+        let kind = KINDS[1 + seed as usize % (KINDS.len() - 1)];
         let mut robot = robot(|config| {
             config.prefilter.kind = kind;
             config.prefilter.frequency_hz = 12.0;
@@ -154,7 +154,7 @@ fn staircase(rng: &mut ChaCha8Rng, reach_mm: f64) -> String {
 
 fn scenario(seed: u64) -> (Robot, String) {
     let robot = robot(|config| {
-        config.prefilter.kind = Kind::ALL[seed as usize % Kind::ALL.len()];
+        config.prefilter.kind = KINDS[seed as usize % KINDS.len()];
         config.prefilter.frequency_hz = 3.0 + (seed % 11) as f32;
         config.feed_limit_mm_s = FEED_LIMIT_MM_S as f32;
         config.corner_tolerance_mm = [0.01, 0.05, 0.2, 0.5, 2.0][seed as usize % 5];

@@ -82,6 +82,20 @@ pub fn report(robot: &Robot, program: &str, setpoints: &[Setpoint]) -> Report {
     check(&program, &rows(setpoints), &options)
 }
 
+/// What these tests go through: the published prefilters, and of the others the one with the
+/// most impulses for its length and the one with two boxes.
+pub const KINDS: [Kind; 9] = [
+    Kind::None,
+    Kind::Zv,
+    Kind::Zvd,
+    Kind::Ei,
+    Kind::Fir,
+    Kind::FirZv,
+    Kind::FirZvd,
+    Kind::TwoHumpEi,
+    Kind::SCurve,
+];
+
 /// How far a polyline of samples may cut a path on which the velocity jumps by twice the
 /// feedrate: half of what the tool travels in a tick. A box makes that a micrometre.
 pub fn allowance_mm(kind: Kind, feed_mm_s: f64) -> f64 {

@@ -42,7 +42,7 @@ impl Filtered {
         let stages = prefilter.map_or(&[][..], Prefilter::stages);
         Self {
             // a prefilter that has a response has these too
-            terms: terms(stages, false).unwrap_or_default(),
+            terms: terms(stages, false),
             boxes_s,
             degree: 3 + boxes(stages) as i32,
             end_s: boxes_s.iter().sum::<f64>() + prefilter.map_or(0.0, Prefilter::length_s),

@@ -93,35 +93,27 @@ impl Prefilter {
         let parts = || core::iter::once((config.kind, first)).chain(second);
         let mut prefilter = Self { stages: Vec::new() };
         for (kind, mode) in parts() {
-            prefilter.push_shaper(config, kind, &mode)?;
+            prefilter.push_shaper(config, kind, &mode);
         }
         for (kind, mode) in parts() {
             prefilter.push_boxes(config, kind, &mode)?;
         }
-        prefilter.with_smoothing(
-            config
-                .smoothing_ms
-                .map(|length_ms| f64::from(length_ms) / 1e3),
-        )
+        let in_seconds = |length_ms| f64::from(length_ms) / 1e3;
+        Ok(prefilter.with_smoothing(config.smoothing_ms.map(in_seconds)))
     }
 
-    fn push_shaper(
-        &mut self,
-        config: &PrefilterConfig,
-        kind: Kind,
-        mode: &Mode,
-    ) -> Result<(), PrefilterError> {
+    fn push_shaper(&mut self, config: &PrefilterConfig, kind: Kind, mode: &Mode) {
         let v_tol = f64::from(config.v_tol);
         let impulses = match kind.parts().0 {
-            Shaper::None => return Ok(()),
-            Shaper::Zv(times) => return (0..times).try_for_each(|_| self.push(Stage::Zv(*mode))),
+            Shaper::None => return,
+            Shaper::Zv(times) => return (0..times).for_each(|_| self.push(Stage::Zv(*mode))),
             Shaper::Mzv => Impulses::mzv(mode),
             Shaper::Ei => Impulses::extra_insensitive(mode, v_tol),
             Shaper::TwoHumpEi => Impulses::two_hump_ei(mode, v_tol),
             Shaper::ThreeHumpEi => Impulses::three_hump_ei(mode, v_tol),
             Shaper::Custom => Impulses::custom(&config.impulses),
         };
-        self.push(Stage::Impulses(impulses))
+        self.push(Stage::Impulses(impulses));
     }
 
     fn push_boxes(
@@ -137,31 +129,28 @@ impl Prefilter {
             period_s
         };
         match kind.parts().1 {
-            Boxes::None => Ok(()),
+            Boxes::None => {}
             Boxes::Period => self.push(Stage::Box(period_s)),
             Boxes::Box => self.push(Stage::Box(given_s)),
             Boxes::SCurve => {
                 let length_s = s_curve_box_s(config)?.unwrap_or(given_s);
-                self.push(Stage::Box(length_s))?;
-                self.push(Stage::Box(length_s))
+                self.push(Stage::Box(length_s));
+                self.push(Stage::Box(length_s));
             }
         }
+        Ok(())
     }
 
     /// Adds a stage at its place: shapers first, then boxes, the shorter ones first.
-    fn push(&mut self, stage: Stage) -> Result<(), PrefilterError> {
+    fn push(&mut self, stage: Stage) {
         let rank = |stage: &Stage| match stage {
             Stage::Box(length_s) => *length_s,
             Stage::Zv(_) | Stage::Impulses(_) => 0.0,
         };
-        let place = self
-            .stages
-            .iter()
-            .take_while(|other| rank(other) <= rank(&stage))
-            .count();
-        self.stages
-            .insert(place, stage)
-            .map_err(|_| PrefilterError::TooManyKinks)
+        let before = |other: &&Stage| rank(other) <= rank(&stage);
+        let place = self.stages.iter().take_while(before).count();
+        // two modes have eight stages at the most, smoothing included: there is room
+        let _ = self.stages.insert(place, stage);
     }
 
     /// The same with boxes that keep the feedrate from jumping, in seconds, 0 for none: the
@@ -169,20 +158,14 @@ impl Prefilter {
     ///
     /// A feedrate `F` then accelerates by at most `F/T1`, with a jerk of at most `F/(T1 T2)`,
     /// `T1` and `T2` being the first of [`Prefilter::boxes_s`].
-    ///
-    /// # Errors
-    /// [`PrefilterError::TooManyKinks`] if there is no room for another box in the response.
-    pub fn with_smoothing(mut self, boxes_s: [f64; 2]) -> Result<Self, PrefilterError> {
+    #[must_use]
+    pub fn with_smoothing(mut self, boxes_s: [f64; 2]) -> Self {
         for (enough, length_s) in (1..).zip(boxes_s) {
             if length_s > 0.0 && self.boxes_s().len() < enough {
-                self.push(Stage::Box(length_s))?;
+                self.push(Stage::Box(length_s));
             }
         }
-        if Response::has_room_for(&self.stages) {
-            Ok(self)
-        } else {
-            Err(PrefilterError::TooManyKinks)
-        }
+        self
     }
 
     /// Two boxes in cascade, given by their lengths in seconds: a second-order moving average,

@@ -4,7 +4,8 @@ use heapless::Vec;
 
 use super::{Impulses, Stage};
 
-/// Breakpoints of a response: 3-hump EI for two modes and two boxes have 100.
+/// Breakpoints of a response. The most that settings can ask for are five impulses for each of
+/// two modes and two boxes, `5 · 5 · 2 · 2`.
 const MAX_BREAKS: usize = 100;
 
 /// Boxes of a cascade: S-curves for two modes have four.
@@ -59,18 +60,11 @@ pub(crate) type Terms = Vec<Term, MAX_BREAKS>;
 
 impl Response {
     /// The response of a cascade, or of the same cascade run backwards in time.
-    ///
-    /// The cascade [has room](Self::has_room_for).
     pub(super) fn new(stages: &[Stage], reversed: bool) -> Self {
-        let mut terms = terms(stages, reversed).unwrap_or_default();
+        let mut terms = terms(stages, reversed);
         let variance_s2: f64 = stages.iter().map(Stage::variance_s2).sum();
         terms.sort_unstable_by(|x, y| x.b.total_cmp(&y.b));
         Self::from_terms(&terms, 1 + boxes(stages), libm::sqrt(variance_s2))
-    }
-
-    /// Whether a cascade has no more boxes and breakpoints than a response can have.
-    pub(super) fn has_room_for(stages: &[Stage]) -> bool {
-        boxes(stages) <= MAX_BOXES && terms(stages, false).is_some()
     }
 
     /// One polynomial a piece: shift the last one to the next breakpoint, add its term.
@@ -152,18 +146,18 @@ pub(crate) fn boxes(stages: &[Stage]) -> usize {
     stages.iter().filter(is_box).count()
 }
 
-/// The terms of a cascade's ramp response, or of that run backwards; none if they are too many.
-pub(crate) fn terms(stages: &[Stage], reversed: bool) -> Option<Terms> {
+/// The terms of a cascade's ramp response, or of that run backwards.
+pub(crate) fn terms(stages: &[Stage], reversed: bool) -> Terms {
     let mut terms = Terms::new();
-    add(&mut terms, Term { b: 0.0, c: 1.0 })?;
+    add(&mut terms, Term { b: 0.0, c: 1.0 });
     for stage in stages {
         let impulses = match stage {
             Stage::Box(length_s) => {
                 for Term { b, c } in core::mem::take(&mut terms) {
                     let c = c / length_s;
-                    add(&mut terms, Term { b, c })?;
+                    add(&mut terms, Term { b, c });
                     let b = b + length_s;
-                    add(&mut terms, Term { b, c: -c })?;
+                    add(&mut terms, Term { b, c: -c });
                 }
                 continue;
             }
@@ -179,23 +173,23 @@ pub(crate) fn terms(stages: &[Stage], reversed: bool) -> Option<Terms> {
                     impulse.time_s
                 };
                 let (b, c) = (b + time, c * impulse.amplitude);
-                add(&mut terms, Term { b, c })?;
+                add(&mut terms, Term { b, c });
             }
         }
     }
-    Some(terms)
+    terms
 }
 
-/// Adds a term, joined with one at the same time if there is one; none if there is no room.
-fn add(terms: &mut Vec<Term, MAX_BREAKS>, term: Term) -> Option<()> {
+/// Adds a term, joined with one at the same time if there is one.
+fn add(terms: &mut Vec<Term, MAX_BREAKS>, term: Term) {
     match terms
         .iter_mut()
         .find(|other| libm::fabs(other.b - term.b) < SAME_TIME_S)
     {
         Some(same) => same.c += term.c,
-        None => terms.push(term).ok()?,
+        // there is room, see the capacity
+        None => drop(terms.push(term)),
     }
-    Some(())
 }
 
 /// Rewrites a polynomial in `t` as one in `t − by` (Horner's scheme, repeated).
