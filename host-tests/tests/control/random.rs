@@ -5,7 +5,6 @@ use std::fmt::Write;
 use host_tests::random_program::{Shape, random_program};
 use planner_core::config::Robot;
 use planner_core::motion::Order;
-use planner_core::prefilter::Kind;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
