@@ -17,10 +17,10 @@ use crate::scenario::Scenario;
 use crate::summary::PayloadFigures;
 use crate::trace::Trace;
 
-/// The grid of accelerations in mm/s², each a fortieth above the one before.
+/// The grid of accelerations in mm/s², each a twentieth above the one before.
 const SLOWEST_MM_S2: f32 = 500.0;
 const FASTEST_MM_S2: f32 = 60_000.0;
-const STEP: f32 = 1.025;
+const STEP: f32 = 1.05;
 
 /// What the payload must not exceed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -274,9 +274,15 @@ fn fastest_hops(scenario: &Scenario) -> Result<Vec<Fastest>> {
     if scenario.settings.plant.payload.is_none() || !is_open {
         return Ok(Vec::new());
     }
+    let search = |axes| move || payload_search::fastest(scenario, axes);
+    let searched = thread::scope(|scope| {
+        let threads = HopAxes::ALL.map(|axes| scope.spawn(search(axes)));
+        threads.map(|thread| thread.join())
+    });
     let mut found = Vec::new();
-    for axes in HopAxes::ALL {
-        found.extend(payload_search::fastest(scenario, axes)?);
+    for part in searched {
+        let part = part.map_err(|_| anyhow!("a search was cut short: run it again"))?;
+        found.extend(part?);
     }
     found.sort_by_key(|fastest| fastest.limit as usize);
     Ok(found)
