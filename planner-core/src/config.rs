@@ -209,7 +209,7 @@ impl Robot {
         let prefilter = prefilter_of(config, &arm, &tuning)?;
         Ok(Self {
             config: *config,
-            limits: Limits::new(&config.limits, &arm, &prefilter),
+            limits: Limits::new(config, &arm, &prefilter),
             arm,
             follower,
             tuning,
@@ -249,7 +249,7 @@ impl Robot {
     pub fn tune(&mut self, tuning: &Tuning) -> Result<(), PrefilterError> {
         let prefilter = prefilter_of(&self.config, &self.arm, tuning)?;
         self.kernel = Kernel::new(&prefilter)?;
-        self.limits = Limits::new(&self.config.limits, &self.arm, &prefilter);
+        self.limits = Limits::new(&self.config, &self.arm, &prefilter);
         self.accelerating = prefilter.response();
         self.decelerating = prefilter.reversed_response();
         self.prefilter = prefilter;

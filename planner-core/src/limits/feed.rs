@@ -2,6 +2,7 @@
 
 use super::config::{Bound, LimitsConfig, MotionLimits, Order, Part};
 use super::course::Course;
+use crate::config::RobotConfig;
 use crate::corner::CornerRule;
 use crate::kinematics::{Arm, RateBounds, Ring, RingBounds};
 use crate::math::sqrt_f32;
@@ -57,6 +58,8 @@ pub struct Limits {
     pub(super) boxes: Boxes,
     /// How far the command can be from a raw point of its window, in s of travel.
     reach_s: f32,
+    /// No raw point is faster.
+    fastest_mm_s: f32,
     /// Whether anything is limited.
     is_set: bool,
     boxes_needed: usize,
@@ -173,7 +176,8 @@ impl Limits {
     /// The limits of a robot with this arm and prefilter. The prefilter has the boxes that
     /// they need: see [`with_boxes`].
     #[must_use]
-    pub fn new(config: &LimitsConfig, arm: &Arm, prefilter: &Prefilter) -> Self {
+    pub fn new(robot: &RobotConfig, arm: &Arm, prefilter: &Prefilter) -> Self {
+        let config = &robot.limits;
         let mut joints = config.joints.map(|l| Highest::new(&l, 1_f32.to_radians()));
         joints[2] = Highest::new(&config.joints[2], 1.0);
         let needed = config.boxes_needed();
@@ -197,6 +201,7 @@ impl Limits {
             },
             // and two ticks that a setpoint is behind
             reach_s: (furthest_s + 2.0 * TICK_S) as f32,
+            fastest_mm_s: robot.feed_limit_mm_s,
             is_set: *config != LimitsConfig::default(),
             boxes_needed: needed,
         }
@@ -324,7 +329,7 @@ impl Limits {
             boxes.linear(&straight, &self.joints[2]),
         ));
         let load = load(course.plane_mm);
-        let reach_mm = load.jerk * self.reach_s;
+        let reach_mm = load.jerk.min(self.fastest_mm_s) * self.reach_s;
         let ring = Ring {
             inner_mm: course.ring.inner_mm - reach_mm,
             outer_mm: course.ring.outer_mm + reach_mm,

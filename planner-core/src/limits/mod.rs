@@ -34,7 +34,8 @@
 //! ```
 //!
 //! wherever the command can be. **It is required wherever the tool is within `e·m` of the
-//! segment**, m the largest mean delay of the prefilter seen from either end. That is enough
+//! segment** (within `F_max m` if that is less, `F_max` the robot's fastest feedrate), m the largest
+//! mean delay of the prefilter seen from either end. That is enough
 //! without knowing what follows: of the segments that move the raw point within a window of
 //! `T_h` take the one with the largest load e*. All loads and speeds are at most e*, so the
 //! command is within `e*·m` of every raw point of the window, hence of that segment; there its
