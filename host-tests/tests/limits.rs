@@ -303,8 +303,8 @@ fn twenty_paths_near_singular_poses_run_to_their_end() {
 #[test]
 fn limits_that_do_not_bind_change_no_bit() {
     let high = "joint1-velocity=1e5 joint2-velocity=1e5 path-velocity=1e5 \
-        joint1-acceleration=1e6 joint2-acceleration=1e6 joint4-acceleration=1e6 \
-        axis-acceleration=1e6";
+        joint1-acceleration=1e7 joint2-acceleration=1e7 joint4-acceleration=1e7 \
+        axis-acceleration=1e7";
     for seed in 0..12 {
         let kind = [Kind::Fir, Kind::FirZv, Kind::FirZvd][seed as usize % 3];
         let program = random_program(

@@ -20,8 +20,7 @@
 //! ```
 //!
 //! H is measured by its spectral norm, D by `√(D_rrr² + 3 D_rrt² + 3 D_rtt² + D_ttt²)`, which is
-//! at least `|D[u, u, u]|` for every unit vector u, or by `√(D_rrr² + 3 D_rtt²) + 2a/r³`, which
-//! is so too, whichever is less. All nine norms fall and then rise with r,
+//! at least `|D[u, u, u]|` for every unit vector u, and at most twice it for one. All nine norms fall and then rise with r,
 //! so that over an interval each is largest at one of its ends: a test shows it for arms with
 //! links of 1 : 10 to 10 : 1.
 
@@ -159,8 +158,7 @@ impl RingBounds {
             *bound = RateBounds {
                 first,
                 second: 0.5 * (rr + tt).abs() + sqrt_f32(half * half + rt * rt),
-                third: sqrt_f32(f3 * f3 + 3.0 * rtt * rtt + 4.0 * rrt * rrt)
-                    .min(sqrt_f32(f3 * f3 + 3.0 * rtt * rtt) + rrt),
+                third: sqrt_f32(f3 * f3 + 3.0 * rtt * rtt + 4.0 * rrt * rrt),
             };
         }
         bounds
@@ -276,7 +274,7 @@ mod tests {
                             "{ratio} {r} {order}: {value} {bound}"
                         );
                         // the norm of D is no spectral norm
-                        let met = [0.995, 0.995, 0.55][order];
+                        let met = [0.995, 0.995, 0.49][order];
                         assert!(value >= bound * met, "{ratio} {r} {order}: {value} {bound}");
                     }
                 }
