@@ -258,7 +258,6 @@ impl Robot {
     }
 
     /// The boxes that the prefilter was given because limits need them, in s.
-    #[must_use]
     pub fn added_boxes_s(&self) -> impl Iterator<Item = f64> {
         let own = self.tuning.prefilter();
         let own = own.map(|own| own.boxes_s()).unwrap_or_default();
