@@ -11,6 +11,7 @@ pub mod bridge;
 pub mod checker;
 pub mod commands;
 pub mod emulator;
+pub mod limit_use;
 pub mod link;
 pub mod machine;
 pub mod methods;

@@ -1,6 +1,7 @@
 //! A run beside the same run without a prefilter.
 
 use anyhow::Result;
+use planner_core::config::RobotConfig;
 use planner_core::prefilter::Kind;
 
 use crate::plant::PayloadConfig;
@@ -19,6 +20,8 @@ pub struct PairedRun {
     pub summary: Summary,
     /// What swings under the tool, if anything does.
     pub payload: Option<PayloadConfig>,
+    /// The robot's settings.
+    pub robot: RobotConfig,
 }
 
 impl PairedRun {
@@ -38,6 +41,7 @@ impl PairedRun {
             unfiltered,
             summary,
             payload: scenario.settings.plant.payload,
+            robot: scenario.settings.robot,
         })
     }
 }

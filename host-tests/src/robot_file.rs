@@ -9,6 +9,7 @@ use std::path::Path;
 use planner_core::config::{ConfigError, Robot, RobotConfig};
 use planner_core::hop::{HopAxes, HopError};
 use planner_core::kinematics::{ArmKind, DeltaConfig, DeltaError, Elbow, JointRange, ScaraError};
+use planner_core::limits::{LimitsConfig, MotionLimits};
 use planner_core::posture::{FollowError, MapError};
 use planner_core::prefilter::{CustomImpulse, Kind, MAX_IMPULSES, PrefilterConfig, PrefilterError};
 use planner_core::servo::ServoConfig;
@@ -171,6 +172,7 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
             FollowError::Shortest(_) => vec!["prefilter.residual_limit", "prefilter.uncertainty"],
         },
         ConfigError::Hop(error) => match error {
+            HopError::Limited => vec!["limits"],
             HopError::Rise { .. } => vec!["hop.rise_mm", "hop.height_mm"],
             HopError::Range { name, .. } => match *name {
                 "hop-height" => vec!["hop.height_mm"],
@@ -179,15 +181,45 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
                 _ => vec!["hop.acceleration_mm_s2"],
             },
         },
+        ConfigError::LimitsOnDelta => vec!["limits"],
+        ConfigError::LimitsOnMap => vec!["map", "limits"],
         ConfigError::Range { name, .. } => match *name {
             "tolerance" => vec!["motion.corner_tolerance_mm"],
             "overlap" => vec!["motion.corner_overlap_percent"],
             "rapid" => vec!["motion.rapid_mm_s"],
             "feed-limit" => vec!["motion.feed_limit_mm_s"],
             "joint-speed" => vec!["motion.joint_speed_deg_s"],
-            _ => vec!["motion.yaw_limit_deg_s"],
+            "yaw-limit" => vec!["motion.yaw_limit_deg_s"],
+            name => limit_key(name).into_iter().collect(),
         },
     }
+}
+
+/// The key of a limit's setting: its table, and in it the value of that name.
+fn limit_key(name: &str) -> Option<&'static str> {
+    let keys = [
+        "limits.joint1.velocity_deg_s",
+        "limits.joint1.acceleration_deg_s2",
+        "limits.joint1.jerk_deg_s3",
+        "limits.joint2.velocity_deg_s",
+        "limits.joint2.acceleration_deg_s2",
+        "limits.joint2.jerk_deg_s3",
+        "limits.joint3.velocity_mm_s",
+        "limits.joint3.acceleration_mm_s2",
+        "limits.joint3.jerk_mm_s3",
+        "limits.joint4.velocity_deg_s",
+        "limits.joint4.acceleration_deg_s2",
+        "limits.joint4.jerk_deg_s3",
+        "limits.path.velocity_mm_s",
+        "limits.path.acceleration_mm_s2",
+        "limits.path.jerk_mm_s3",
+        "limits.axis.velocity_mm_s",
+        "limits.axis.acceleration_mm_s2",
+        "limits.axis.jerk_mm_s3",
+    ];
+    let (part, order) = name.split_once('-')?;
+    let start = format!("limits.{part}.{order}_");
+    keys.into_iter().find(|key| key.starts_with(&start))
 }
 
 #[derive(Deserialize, Default)]
@@ -199,6 +231,7 @@ struct Tables {
     prefilter: PrefilterTable,
     motion: MotionTable,
     hop: HopTable,
+    limits: LimitsTable,
     plant: PlantTable,
     servo: ServoTables,
 }
@@ -311,6 +344,67 @@ struct HopTable {
     acceleration_mm_s2: Option<f32>,
     #[serde(deserialize_with = "hop_axes")]
     axes: Option<HopAxes>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct LimitsTable {
+    joint1: TurnLimitsTable,
+    joint2: TurnLimitsTable,
+    joint3: LengthLimitsTable,
+    joint4: TurnLimitsTable,
+    path: LengthLimitsTable,
+    axis: LengthLimitsTable,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct TurnLimitsTable {
+    velocity_deg_s: Option<f32>,
+    acceleration_deg_s2: Option<f32>,
+    jerk_deg_s3: Option<f32>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct LengthLimitsTable {
+    velocity_mm_s: Option<f32>,
+    acceleration_mm_s2: Option<f32>,
+    jerk_mm_s3: Option<f32>,
+}
+
+impl LimitsTable {
+    fn config(&self) -> LimitsConfig {
+        let values = |[velocity, acceleration, jerk]: [Option<f32>; 3]| MotionLimits {
+            velocity: velocity.unwrap_or_default(),
+            acceleration: acceleration.unwrap_or_default(),
+            jerk: jerk.unwrap_or_default(),
+        };
+        let turn = |table: &TurnLimitsTable| {
+            values([
+                table.velocity_deg_s,
+                table.acceleration_deg_s2,
+                table.jerk_deg_s3,
+            ])
+        };
+        let length = |table: &LengthLimitsTable| {
+            values([
+                table.velocity_mm_s,
+                table.acceleration_mm_s2,
+                table.jerk_mm_s3,
+            ])
+        };
+        LimitsConfig {
+            joints: [
+                turn(&self.joint1),
+                turn(&self.joint2),
+                length(&self.joint3),
+                turn(&self.joint4),
+            ],
+            path: length(&self.path),
+            axis: length(&self.axis),
+        }
+    }
 }
 
 #[derive(Deserialize, Default)]
@@ -462,6 +556,7 @@ impl Tables {
         set(&mut robot.hop.tolerance_mm, hop.tolerance_mm);
         set(&mut robot.hop.acceleration_mm_s2, hop.acceleration_mm_s2);
         set(&mut robot.hop.axes, hop.axes);
+        robot.limits = self.limits.config();
         let mut plant = self.plant.config(&robot);
         let servo = &self.servo;
         let tables = [&servo.joint1, &servo.joint2, &servo.joint3, &servo.joint4];
@@ -667,6 +762,14 @@ mod tests {
         let payload = found.plant.payload.unwrap();
         assert_eq!(payload.length_mm, PayloadConfig::STIFF.length_mm);
         assert_eq!(payload.mass_kg, 0.1);
+        let text = "limits.joint4.jerk_deg_s3 = 5\nlimits.joint3.velocity_mm_s = 6\n\
+                    limits.axis.acceleration_mm_s2 = 7";
+        let limits = RobotSettings::parse("r.toml", text).unwrap().robot.limits;
+        assert_eq!(
+            (limits.joints[3].jerk, limits.joints[2].velocity),
+            (5.0, 6.0)
+        );
+        assert_eq!(limits.axis.acceleration, 7.0);
     }
 
     #[test]
@@ -752,6 +855,14 @@ mod tests {
             (
                 "[motion]\n\nrapid_mm_s = 0",
                 "r.toml, line 3, key motion.rapid_mm_s: the setting rapid",
+            ),
+            (
+                "[limits.joint2]\njerk_deg_s3 = -1",
+                "r.toml, line 2, key limits.joint2.jerk_deg_s3: the setting joint2-jerk",
+            ),
+            (
+                "limits.joint3.velocity_deg_s = 1",
+                "key limits.joint3.velocity_deg_s: unknown field",
             ),
             (
                 "plant.mode_damping = 2",

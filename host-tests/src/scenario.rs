@@ -9,10 +9,12 @@ use crate::checker::hops::{Hop, HopDefaults, hops, vertical_deviations_mm};
 use crate::checker::{
     self, CheckOptions, JointPeaks, Program, Report, TraceRow, joint_peaks, settling_time_s,
 };
+use crate::limit_use::{LimitUse, limit_uses};
 use crate::machine::Machine;
 use crate::program_file::ProgramFile;
 use crate::progress::Progress;
 use crate::robot_file::RobotSettings;
+use crate::software_loop;
 use crate::summary::PayloadFigures;
 use crate::trace::{PlantKind, SETTLED_MM, Trace};
 use crate::vector::xyz;
@@ -53,6 +55,10 @@ pub struct Outcome {
     pub payload: PayloadFigures,
     /// Peaks of the joint setpoints.
     pub joint_peaks: JointPeaks,
+    /// What became of the robot's limits; empty if it has none.
+    pub limits: Vec<LimitUse>,
+    /// Boxes in s that the prefilter was given because limits need them.
+    pub added_boxes_s: Vec<f64>,
     /// Instructions of the dearest tick; the host does not count.
     pub tick_instructions_max: Option<u32>,
 }
@@ -72,6 +78,8 @@ impl Scenario {
         let trace = Trace::simulate(setpoints, self.plant, &self.settings.plant, progress);
         let motion = setpoints.len();
         let mut outcome = self.measure(&robot, trace, motion);
+        let limited = software_loop::limited_feeds(&robot, &self.program.text)?;
+        outcome.limits = limit_uses(&robot, &outcome.trace, &limited);
         outcome.tick_instructions_max = recording.tick_instructions_max;
         Ok(outcome)
     }
@@ -113,6 +121,8 @@ impl Scenario {
             vertical_deviation_mm: self.vertical_deviation_mm(&rows),
             payload: PayloadFigures::new(&trace, self.settings.plant.payload.as_ref()),
             joint_peaks: joint_peaks(&trace.joints(), Trace::time_s(1)),
+            limits: limit_uses(robot, &trace, &[]),
+            added_boxes_s: robot.added_boxes_s().collect(),
             tick_instructions_max: None,
             trace,
         }

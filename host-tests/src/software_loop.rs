@@ -3,6 +3,7 @@
 use std::fmt;
 
 use planner_core::config::Robot;
+use planner_core::limits::Limited;
 use planner_core::motion::{DelayLines, Motion, MotionState, Order, Setpoint};
 use planner_core::planner::{LineError, Planner};
 use planner_core::queue::SegmentQueue;
@@ -40,6 +41,15 @@ impl From<LineError> for ProgramError {
 /// # Errors
 /// [`ProgramError`] names the first line that is refused.
 pub fn check(robot: &Robot, program: &str) -> Result<(), ProgramError> {
+    limited_feeds(robot, program).map(drop)
+}
+
+/// Plans the whole program without moving, and yields the segments whose feed a limit lowers.
+///
+/// # Errors
+/// As [`check`].
+pub fn limited_feeds(robot: &Robot, program: &str) -> Result<Vec<Limited>, ProgramError> {
+    let mut limited = Vec::new();
     let mut queue = SegmentQueue::new();
     let (producer, mut consumer) = queue.split();
     let mut planner = Planner::new(robot, producer);
@@ -47,6 +57,7 @@ pub fn check(robot: &Robot, program: &str) -> Result<(), ProgramError> {
     for line in program.lines() {
         let accepted = planner.line(line.as_bytes())?;
         moves |= accepted.queued;
+        limited.extend(accepted.limited);
         if accepted.ended {
             break;
         }
@@ -54,7 +65,7 @@ pub fn check(robot: &Robot, program: &str) -> Result<(), ProgramError> {
         while consumer.pop_kernel().is_some() {}
     }
     if moves {
-        Ok(())
+        Ok(limited)
     } else {
         Err(ProgramError::Empty)
     }

@@ -7,6 +7,7 @@ use planner_core::pose::JointUnit;
 use serde::Serialize;
 
 use crate::checker::Report;
+use crate::limit_use::LimitUse;
 use crate::plant::{PayloadConfig, PayloadSample};
 use crate::scenario::{Outcome, Scenario};
 use crate::trace::Trace;
@@ -36,6 +37,10 @@ pub struct Summary {
     pub ratios: Ratios,
     /// Instructions of the dearest tick; null on the host.
     pub tick_instructions_max: Option<u32>,
+    /// What became of the robot's limits of motion; empty if it has none.
+    pub limits: Vec<LimitUse>,
+    /// Boxes that the prefilter was given because limits need them.
+    pub added_boxes_s: Vec<f64>,
 }
 
 /// What is measured of each prefilter.
@@ -144,6 +149,8 @@ impl Summary {
             figures: Figures::new(outcome),
             ratios: Ratios::new(outcome, unfiltered),
             tick_instructions_max: outcome.tick_instructions_max,
+            limits: outcome.limits.clone(),
+            added_boxes_s: outcome.added_boxes_s.clone(),
         }
     }
 

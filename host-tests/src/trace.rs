@@ -274,7 +274,7 @@ fn pose(setpoint: &Setpoint) -> [f64; 4] {
 }
 
 /// A setpoint's joints: rad, a quill's mm.
-fn joints(setpoint: &Setpoint) -> [f64; 4] {
+pub fn joints(setpoint: &Setpoint) -> [f64; 4] {
     let units = setpoint.arm.joint_units();
     setpoint.joints.position.values(units)
 }

@@ -7,6 +7,7 @@ use crate::hop::{HopAxes, HopConfig, HopError};
 use crate::kinematics::{
     Arm, ArmKind, Delta, DeltaConfig, DeltaError, Elbow, JointRange, Scara, ScaraConfig, ScaraError,
 };
+use crate::limits::{Limits, LimitsConfig, MotionLimits, Part, with_boxes};
 use crate::pose::AXES;
 use crate::posture::{FollowConfig, FollowError, Follower, ModeMapConfig, PostureMethod, Tuning};
 use crate::prefilter::{Kernel, Kind, Prefilter, PrefilterConfig, PrefilterError, Response};
@@ -41,6 +42,8 @@ pub struct RobotConfig {
     pub joint_speed_deg_s: f32,
     /// How pick-and-place moves go where the program does not say.
     pub hop: HopConfig,
+    /// Limits of velocity, acceleration and jerk.
+    pub limits: LimitsConfig,
 }
 
 impl Default for RobotConfig {
@@ -59,6 +62,7 @@ impl Default for RobotConfig {
             yaw_limit_deg_s: 360.0,
             joint_speed_deg_s: 90.0,
             hop: HopConfig::default(),
+            limits: LimitsConfig::default(),
         }
     }
 }
@@ -76,6 +80,11 @@ pub enum ConfigError {
     Follow(FollowError),
     /// Pick-and-place moves.
     Hop(HopError),
+    /// Limits of motion of a delta robot: they need bounds on its joints that are not there.
+    LimitsOnDelta,
+    /// Limits of acceleration or jerk beside a map of the mode: where the prefilter changes on
+    /// the way of a move, they are not kept.
+    LimitsOnMap,
     /// A plain number is out of its range.
     Range {
         /// Name of the setting.
@@ -121,6 +130,12 @@ impl fmt::Display for ConfigError {
             Self::Prefilter(error) => error.fmt(f),
             Self::Follow(error) => error.fmt(f),
             Self::Hop(error) => error.fmt(f),
+            Self::LimitsOnDelta => f.write_str(
+                "limits of motion are not kept by a delta robot yet: leave them out",
+            ),
+            Self::LimitsOnMap => f.write_str(
+                "limits of acceleration and jerk are not kept while the prefilter follows a map of the mode: leave out the map or those limits",
+            ),
             Self::Range {
                 name,
                 value,
@@ -155,6 +170,8 @@ pub struct Robot {
     pub accelerating: Response,
     /// What a deceleration looks like from its end.
     pub decelerating: Response,
+    /// What limits its motion.
+    pub limits: Limits,
 }
 
 impl Robot {
@@ -182,15 +199,18 @@ impl Robot {
             }
         }
         config.hop.check()?;
+        check_limits(config)?;
+        let arm = match config.arm {
+            ArmKind::Scara => Arm::Scara(Scara::new(&config.scara)?),
+            ArmKind::Delta => Arm::Delta(Delta::new(&config.delta)?),
+        };
         let follower = follower(config)?;
         let tuning = first_tuning(config, follower.as_ref());
-        let prefilter = tuning.prefilter()?;
+        let prefilter = prefilter_of(config, &arm, &tuning)?;
         Ok(Self {
             config: *config,
-            arm: match config.arm {
-                ArmKind::Scara => Arm::Scara(Scara::new(&config.scara)?),
-                ArmKind::Delta => Arm::Delta(Delta::new(&config.delta)?),
-            },
+            limits: Limits::new(config, &arm, &prefilter),
+            arm,
             follower,
             tuning,
             kernel: Kernel::new(&prefilter)?,
@@ -227,13 +247,70 @@ impl Robot {
     /// # Errors
     /// [`PrefilterError`] names the value that is out of range; nothing is changed then.
     pub fn tune(&mut self, tuning: &Tuning) -> Result<(), PrefilterError> {
-        let prefilter = tuning.prefilter()?;
+        let prefilter = prefilter_of(&self.config, &self.arm, tuning)?;
         self.kernel = Kernel::new(&prefilter)?;
+        self.limits = Limits::new(&self.config, &self.arm, &prefilter);
         self.accelerating = prefilter.response();
         self.decelerating = prefilter.reversed_response();
         self.prefilter = prefilter;
         self.tuning = *tuning;
         Ok(())
+    }
+
+    /// The boxes that the prefilter was given because limits need them, in s.
+    pub fn added_boxes_s(&self) -> impl Iterator<Item = f64> {
+        let own = self.tuning.prefilter();
+        let own = own.map(|own| own.boxes_s()).unwrap_or_default();
+        let all = self.prefilter.boxes_s();
+        all.into_iter()
+            .filter(move |length_s| !own.contains(length_s))
+    }
+}
+
+/// The prefilter of a tuning, with the boxes that the robot's limits need.
+fn prefilter_of(
+    robot: &RobotConfig,
+    arm: &Arm,
+    tuning: &Tuning,
+) -> Result<Prefilter, PrefilterError> {
+    let prefilter = tuning.prefilter()?;
+    Ok(with_boxes(prefilter, &robot.limits, arm, robot.rapid_mm_s))
+}
+
+fn check_limits(config: &RobotConfig) -> Result<(), ConfigError> {
+    let limits = &config.limits;
+    if config.arm == ArmKind::Delta && *limits != LimitsConfig::default() {
+        return Err(ConfigError::LimitsOnDelta);
+    }
+    if config.map.is_some() && limits.boxes_needed() > 0 {
+        return Err(ConfigError::LimitsOnMap);
+    }
+    for (part, values) in limits.all() {
+        let names = limit_names(part);
+        let values = [values.velocity, values.acceleration, values.jerk];
+        for ((name, value), high) in names.iter().zip(values).zip(LimitsConfig::HIGHEST) {
+            if !(0.0..=high).contains(&value) {
+                return Err(ConfigError::Range {
+                    name,
+                    value,
+                    low: 0.0,
+                    high,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The settings of the limits of a part.
+const fn limit_names(part: Part) -> &'static [&'static str; 3] {
+    match part {
+        Part::Joint(1) => &["joint1-velocity", "joint1-acceleration", "joint1-jerk"],
+        Part::Joint(2) => &["joint2-velocity", "joint2-acceleration", "joint2-jerk"],
+        Part::Joint(3) => &["joint3-velocity", "joint3-acceleration", "joint3-jerk"],
+        Part::Joint(_) => &["joint4-velocity", "joint4-acceleration", "joint4-jerk"],
+        Part::Path => &["path-velocity", "path-acceleration", "path-jerk"],
+        Part::Axis => &["axis-velocity", "axis-acceleration", "axis-jerk"],
     }
 }
 
@@ -317,8 +394,9 @@ impl RobotConfig {
     }
 
     /// Names of all settings, in groups whose values must fit each other: lengths in mm, angles
-    /// in °, the frequency in Hz, feedrates in mm/s, the yaw limit in °/s.
-    pub const GROUPS: [&'static [&'static str]; 21] = [
+    /// in °, the frequency in Hz, feedrates in mm/s, the yaw limit in °/s, limits of joints 1, 2 and 4
+    /// in °, the others in mm.
+    pub const GROUPS: [&'static [&'static str]; 27] = [
         &[
             "robot",
             "delta-base",
@@ -366,6 +444,12 @@ impl RobotConfig {
         &["hop-tolerance"],
         &["hop-acceleration"],
         &["hop-axes"],
+        limit_names(Part::Joint(1)),
+        limit_names(Part::Joint(2)),
+        limit_names(Part::Joint(3)),
+        limit_names(Part::Joint(4)),
+        limit_names(Part::Path),
+        limit_names(Part::Axis),
     ];
 
     /// Travels of joints 1 to 4 in ° or mm.
@@ -451,6 +535,9 @@ impl RobotConfig {
     }
 
     fn slot(&mut self, name: &str) -> Option<Slot<'_>> {
+        if let Some(limit) = limit_named(&mut self.limits, name) {
+            return Some(Slot::Number(limit));
+        }
         let [joint1, joint2, joint3, joint4] = &mut self.scara.joint_limits;
         let prefilter = &mut self.prefilter;
         let second = &mut prefilter.second;
@@ -514,6 +601,28 @@ impl RobotConfig {
             "joint-speed" => Slot::Number(&mut self.joint_speed_deg_s),
             _ => return None,
         })
+    }
+}
+
+/// The limit of that name, as in `joint1-jerk`.
+fn limit_named<'a>(limits: &'a mut LimitsConfig, name: &str) -> Option<&'a mut f32> {
+    let (part, order) = name.split_once('-')?;
+    let LimitsConfig { joints, path, axis } = limits;
+    let [joint1, joint2, joint3, joint4] = joints;
+    let limits: &mut MotionLimits = match part {
+        "joint1" => joint1,
+        "joint2" => joint2,
+        "joint3" => joint3,
+        "joint4" => joint4,
+        "path" => path,
+        "axis" => axis,
+        _ => return None,
+    };
+    match order {
+        "velocity" => Some(&mut limits.velocity),
+        "acceleration" => Some(&mut limits.acceleration),
+        "jerk" => Some(&mut limits.jerk),
+        _ => None,
     }
 }
 

@@ -12,6 +12,7 @@ pub mod gcode;
 pub mod hop;
 pub mod joint_space;
 pub mod kinematics;
+pub mod limits;
 pub mod math;
 pub mod motion;
 pub mod orientation;

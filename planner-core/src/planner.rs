@@ -9,6 +9,7 @@ use crate::gcode::{
 };
 use crate::hop::{self, Hop, HopConfig, HopError, HopLimits};
 use crate::kinematics::{Arm, Elbow, PoseError, SegmentError};
+use crate::limits::{Course, Limited};
 use crate::path::{PathSegment, Shape};
 use crate::pose::{JointPosition, Pose};
 use crate::posture::{MoveToFollow, MoveTunings, Tuning};
@@ -16,7 +17,7 @@ use crate::prefilter::{Kernel, PrefilterConfig};
 use crate::queue::{KERNELS_A_LINE, SegmentProducer};
 use crate::raw::{LONGEST_S, Pace};
 use crate::schedule::{Schedule, Timing};
-use crate::units::AngleRad;
+use crate::units::{AngleRad, LengthMm, TICK_S};
 
 /// What became of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -31,6 +32,8 @@ pub struct Accepted {
     pub offsets_stored: bool,
     /// The program has ended.
     pub ended: bool,
+    /// A limit lowers the feed of its last motion.
+    pub limited: Option<Limited>,
 }
 
 /// Why a line was refused; nothing moves because of it.
@@ -315,7 +318,24 @@ impl<'q> Planner<'q> {
     /// Moves the joints in `duration_s`, to find limit inputs: the position is not known then.
     /// The queue has to be empty.
     pub fn move_joints(&mut self, from: JointPosition, to: JointPosition, duration_s: f64) {
+        let duration_s = self.joint_move_s(&from, &to, duration_s);
         self.schedule.move_joints(from, to, duration_s);
+    }
+
+    /// How long a move of the joints takes, `asked_s` or as much as the limits need.
+    fn joint_move_s(&self, from: &JointPosition, to: &JointPosition, asked_s: f64) -> f64 {
+        if !self.robot.limits.is_set() {
+            return asked_s;
+        }
+        let mut ways = [0.0; 4];
+        let units = [f64::from(AngleRad::DELTA), f64::from(LengthMm::DELTA)];
+        let bits = from.to_bits().into_iter().zip(to.to_bits());
+        for ((way, (from, to)), unit) in ways.iter_mut().zip(bits).zip([0, 0, 1, 0]) {
+            *way = (f64::from(to.abs_diff(from)) * units[unit]) as f32;
+        }
+        let asked = asked_s.max(TICK_S) as f32;
+        let (least_s, _) = self.robot.limits.joint_move_s(ways, asked);
+        asked_s.max(f64::from(least_s))
     }
 
     /// Counts a line that could not be read.
@@ -367,6 +387,7 @@ impl<'q> Planner<'q> {
         }
         let mut queued = false;
         let mut folded = None;
+        let mut limited = None;
         match &command.robot {
             Some(RobotChange::Prefilter(config)) => {
                 self.robot.set_prefilter(config).map_err(Cause::Prefilter)?;
@@ -399,6 +420,7 @@ impl<'q> Planner<'q> {
         }
         for (order, timing) in command.moves().zip(&timings) {
             queued |= timing.duration_s > 0.0 && self.plan_move(order, timing);
+            limited = self.schedule.limited();
         }
         if let Some(outputs) = command.outputs_after {
             queued |= self.schedule.switch(outputs);
@@ -416,6 +438,7 @@ impl<'q> Planner<'q> {
             offset_changed: interpreted.moves_work_zero(),
             offsets_stored: interpreted.stores_offsets(),
             ended: command.flow == Some(ProgramFlow::End),
+            limited,
         })
     }
 
@@ -511,12 +534,13 @@ impl<'q> Planner<'q> {
         let furthest = ways.map(|(from, to)| to.abs_diff(from)).max().unwrap_or(0);
         let furthest_rad = f64::from(AngleRad::DELTA) * f64::from(furthest);
         let speed_rad_s = f64::from(self.robot.config.joint_speed_deg_s).to_radians();
+        let duration_s = self.joint_move_s(&from, &to, furthest_rad / speed_rad_s);
         Ok(Some(ElbowMove {
             elbow,
             from,
             to,
             pose,
-            duration_s: furthest_rad / speed_rad_s,
+            duration_s,
         }))
     }
 
@@ -569,6 +593,9 @@ impl<'q> Planner<'q> {
     /// vertical parts, and down. Not inlined, as [`Planner::elbow_move`].
     #[inline(never)]
     fn checked_hop(&self, arm: &Arm, order: &HopMove) -> Result<Hop, Cause> {
+        if self.robot.limits.is_set() {
+            return Err(Cause::Hop(HopError::Limited));
+        }
         let config = &self.robot.config;
         let own = config.hop;
         let wanted = HopConfig {
@@ -598,17 +625,29 @@ impl<'q> Planner<'q> {
 
     /// How long a motion takes; zero if it is shorter than anything.
     fn checked_timing(&self, arm: &Arm, order: &Move) -> Result<Timing, Cause> {
-        let timing = self.timing(&order.path, order.feed);
-        if timing.duration_s > LONGEST_S {
-            return Err(Cause::TooSlow {
-                duration_s: timing.duration_s,
-            });
-        }
-        if timing.duration_s > 0.0 {
+        let mut timing = self.timing(&order.path, order.feed);
+        if timing.duration_s > 0.0 && timing.duration_s <= LONGEST_S {
             let checked = arm.check_segment(&order.path);
             checked.map_err(Cause::Segment)?;
+            if self.robot.limits.is_set() {
+                self.limit(&order.path, &mut timing);
+            }
+        }
+        // A segment that may not take its full feed takes half of it at the least.
+        let duration_s = timing.duration_s.max(2.0 * f64::from(timing.least_s));
+        if duration_s > LONGEST_S {
+            return Err(Cause::TooSlow { duration_s });
         }
         Ok(timing)
+    }
+
+    /// How long a segment takes at the robot's limits of motion.
+    fn limit(&self, path: &PathSegment, timing: &mut Timing) {
+        // what the highest override could make of it
+        let hurried_s = (0.5 * timing.duration_s).max(timing.shortest_s);
+        let asked_s = hurried_s.max(TICK_S) as f32;
+        let course = Course::new(path);
+        (timing.least_s, timing.bound) = self.robot.limits.least_s(&course, asked_s);
     }
 
     /// Stops, then stands for so long; where the position is unknown nothing has moved.
@@ -641,6 +680,8 @@ impl<'q> Planner<'q> {
             },
             shortest_s,
             pace,
+            least_s: 0.0,
+            bound: None,
         }
     }
 }

@@ -45,7 +45,7 @@ pub struct RawSegment {
     /// Progress a tick, in 2^-62 of the segment.
     pub rate: u64,
     /// How long before the deceleration of the segment before ends it begins to accelerate;
-    /// 0 after an exact stop.
+    /// 0 after an exact stop, below 0 after one that lasts longer.
     pub overlap: TickTime,
     /// What an arc adds to its chord.
     pub bow: Option<Bow>,

@@ -10,6 +10,7 @@ use crate::config::Robot;
 use crate::corner::{self, Corner, CornerRule, Side, reach_s};
 use crate::hop::Hop;
 use crate::kinematics::Elbow;
+use crate::limits::{Bound, Choice, Course, Limited, Run};
 use crate::math::sqrt_f32;
 use crate::path::PathSegment;
 use crate::pose::{JointPosition, Pose};
@@ -56,6 +57,19 @@ pub struct Timing {
     pub shortest_s: f64,
     /// Which override it follows.
     pub pace: Pace,
+    /// What it takes at the robot's limits of motion while it is walked alone: see
+    /// [`crate::limits::Limits::least_s`].
+    pub least_s: f32,
+    /// The limit that sets it.
+    pub bound: Option<Bound>,
+}
+
+impl Timing {
+    fn keep(&mut self, choice: &Choice) {
+        let least_s = f64::from(choice.least_s);
+        self.duration_s = self.duration_s.max(least_s);
+        self.shortest_s = self.shortest_s.max(least_s);
+    }
 }
 
 /// Times segments and hands them to the tick.
@@ -65,6 +79,10 @@ pub struct Schedule<'q> {
     previous: Option<Side>,
     /// The corners that are still being rounded, oldest first.
     blends: Deque<Blend, BLENDING_CORNERS>,
+    /// What the limits have to know of the path so far.
+    run: Run,
+    /// What limits the last segment planned.
+    limited: Option<Limited>,
 }
 
 impl<'q> Schedule<'q> {
@@ -74,6 +92,8 @@ impl<'q> Schedule<'q> {
             queue,
             previous: None,
             blends: Deque::new(),
+            run: Run::default(),
+            limited: None,
         }
     }
 
@@ -82,10 +102,16 @@ impl<'q> Schedule<'q> {
         self.queue.free_places()
     }
 
+    /// What lowers the feed of the last segment planned, if a limit does.
+    pub fn limited(&self) -> Option<Limited> {
+        self.limited
+    }
+
     /// Forgets what came before: the next segment begins from rest.
     pub fn reset(&mut self) {
         self.previous = None;
         self.blends.clear();
+        self.run = Run::default();
     }
 
     /// Plans a segment that follows the last one, with a rule for the corner between the two.
@@ -119,6 +145,29 @@ impl<'q> Schedule<'q> {
         line: u32,
         on_the_way: Option<&Kernel>,
     ) -> bool {
+        let limits = &robot.limits;
+        let limited = limits.is_set().then(|| {
+            let course = Course::new(path);
+            let asked_s = timing.duration_s as f32;
+            let choice = self.run.choose(limits, &course, asked_s, timing.least_s);
+            (course, choice)
+        });
+        let (mut rule, mut timing) = (rule, *timing);
+        let mut stop = 0;
+        if let Some((course, choice)) = &limited {
+            let innermost_mm = self.run.innermost_mm(course);
+            rule = limits.rule(rule, innermost_mm);
+            let asked_s = timing.duration_s;
+            timing.keep(choice);
+            stop = tick_time(f64::from(choice.dwell_s));
+            let is_lowered = timing.duration_s > asked_s;
+            self.limited = timing.bound.filter(|_| is_lowered).map(|bound| Limited {
+                bound,
+                asked_s,
+                takes_s: timing.duration_s,
+                length_mm: path.length_mm(),
+            });
+        }
         let length_mm = path.length_mm() as f32;
         let duration_s = timing.duration_s.clamp(TICK_S, LONGEST_S);
         let (first_tangent, last_tangent, heading_rate_per_mm) = path.tangents();
@@ -133,7 +182,11 @@ impl<'q> Schedule<'q> {
         }
         let overlap = match self.previous {
             None => 0,
-            Some(arriving) => self.corner(robot, &arriving, &side(first_tangent), rule),
+            Some(arriving) => {
+                let leaving = side(first_tangent);
+                let overlap = self.corner(robot, &arriving, &leaving, rule);
+                overlap.min(robot.kernel.length() - stop)
+            }
         };
         self.previous = Some(side(last_tangent));
         let segment = RawSegment {
@@ -153,6 +206,12 @@ impl<'q> Schedule<'q> {
         } else {
             Rate::ONE
         };
+        if let Some((course, choice)) = &limited {
+            let seconds = |time: TickTime| time as f32 / ONE_TICK as f32 * TICK;
+            let dwell_s = seconds(robot.kernel.length() - overlap);
+            let shortest_s = seconds(top_rate.real(segment.duration.min(ONE_TICK << 13)));
+            self.run.take(limits, course, choice, dwell_s, shortest_s);
+        }
         let segment = RawSegment {
             top_rate,
             ..segment

@@ -120,7 +120,8 @@ impl Stand {
             kernel.length() - overlap
         } else {
             let since_arrival = self.time.wrapping_add(left);
-            kernel.stop_time(since_arrival & (ONE_TICK - 1))
+            let stop = kernel.stop_time(since_arrival & (ONE_TICK - 1));
+            stop.max(kernel.length() - overlap)
         }
     }
 }

@@ -5,6 +5,7 @@
 
 pub mod hops;
 pub mod joints;
+pub mod limits;
 pub mod matching;
 pub mod program;
 pub mod report;

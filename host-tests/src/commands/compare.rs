@@ -58,6 +58,8 @@ struct Row {
     prefilter: &'static str,
     /// Why it cannot be used at this frequency; null if it can.
     refused: Option<String>,
+    /// Boxes in s that the prefilter was given because limits need them.
+    added_boxes_s: Vec<f64>,
     #[serde(flatten)]
     measured: Option<Measured>,
 }
@@ -217,11 +219,16 @@ impl Comparison {
             .iter()
             .filter_map(|row| Some(format!("\n{}: {}", row.prefilter, row.refused.as_ref()?)))
             .collect();
+        let added: String = self
+            .prefilters
+            .iter()
+            .filter_map(Row::added_in_words)
+            .collect();
         format!(
             "{}: {} Hz, damping {}, corner tolerance {} mm, {} plant\n{table}\n\
              Settling to ±50 µm after the commanded stop; largest corner error; the tool's \
              acceleration in mm/s²\nin motion and in the 3 s after, and over both as a part of \
-             that without a prefilter; peak joint accelerations.{refused}{}",
+             that without a prefilter; peak joint accelerations.{added}{refused}{}",
             self.program,
             self.frequency_hz,
             self.damping,
@@ -312,6 +319,19 @@ const HEADER: [&str; 10] = [
 ];
 
 impl Row {
+    /// What limits of acceleration and jerk have added to the prefilter.
+    fn added_in_words(&self) -> Option<String> {
+        let boxes = self.added_boxes_s.iter();
+        let boxes: Vec<_> = boxes.map(|s| format!("{:.0} ms", s * 1e3)).collect();
+        (!boxes.is_empty()).then(|| {
+            let name = self.prefilter;
+            format!(
+                "\n{name}: with a moving average of {} besides, which its limits need",
+                boxes.join(" and of ")
+            )
+        })
+    }
+
     fn cells(&self) -> Vec<String> {
         let mut cells = vec![self.prefilter.to_owned()];
         let Some(Measured {
@@ -356,6 +376,7 @@ fn row(scenario: &Scenario, kind: Kind, unfiltered: &Outcome) -> Result<Row> {
         return Ok(Row {
             prefilter: kind.name(),
             refused: Some(error.to_string()),
+            added_boxes_s: Vec::new(),
             measured: None,
         });
     }
@@ -366,6 +387,7 @@ fn row(scenario: &Scenario, kind: Kind, unfiltered: &Outcome) -> Result<Row> {
     Ok(Row {
         prefilter: kind.name(),
         refused: None,
+        added_boxes_s: outcome.added_boxes_s.clone(),
         measured: Some(Measured {
             positions: outcome
                 .trace

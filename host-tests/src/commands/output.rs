@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
+use crate::limit_use::LimitUse;
 use crate::paired_run::PairedRun;
 use crate::pictures;
 use crate::summary::{PayloadFigures, Summary};
@@ -68,6 +69,17 @@ pub fn figures(summary: &Summary) -> Vec<Figure> {
     if let Some(instructions) = summary.tick_instructions_max {
         list.push(("worst tick", format!("{instructions} instructions")));
     }
+    if !summary.added_boxes_s.is_empty() {
+        let boxes = summary.added_boxes_s.iter();
+        let boxes: Vec<_> = boxes.map(|s| format!("{:.0} ms", s * 1e3)).collect();
+        let text = format!(
+            "{} of moving average, without which limits could not be kept",
+            boxes.join(" and ")
+        );
+        list.push(("added to the prefilter", text));
+    }
+    let limits = summary.limits.iter();
+    list.extend(limits.map(|limit| ("limit", limit_in_words(limit))));
     list.into_iter()
         .map(|(name, value)| Figure { name, value })
         .collect()
@@ -94,6 +106,26 @@ fn payload_figures(figures: &PayloadFigures) -> Vec<(&'static str, String)> {
             format!("{swing:.2} mm, {overshoot:.2} mm after the stop"),
         ),
     ]
+}
+
+/// A limit and what became of it.
+fn limit_in_words(limit: &LimitUse) -> String {
+    let LimitUse {
+        limit: name,
+        unit,
+        allowed,
+        largest,
+        lowered_segments,
+        lowest_feed_mm_s,
+    } = limit;
+    let lowered = match (lowered_segments, lowest_feed_mm_s) {
+        (0, _) => String::new(),
+        (count, None) => format!(", lowers the feed of {count} segments"),
+        (count, Some(feed)) => {
+            format!(", lowers the feed of {count} segments, down to {feed:.1} mm/s")
+        }
+    };
+    format!("{name}: {largest:.1} of {allowed} {unit}{lowered}")
 }
 
 /// A ratio of vibrations as a sentence's end.

@@ -6,6 +6,7 @@
 mod canvas;
 mod comparison;
 mod feedrate;
+mod limits;
 mod path;
 mod payload;
 mod polyline;
@@ -31,6 +32,9 @@ pub fn draw(run: &PairedRun) -> Result<Vec<(&'static str, String)>> {
     ];
     if let Some(config) = &run.payload {
         pictures.push(("payload.svg", payload::draw(run, config)?));
+    }
+    if let Some(picture) = limits::draw(run)? {
+        pictures.push(("limits.svg", picture));
     }
     Ok(pictures)
 }

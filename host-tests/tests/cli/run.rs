@@ -276,3 +276,38 @@ fn comparisons_draw_speed_acceleration_and_jerk() {
         }
     }
 }
+
+#[test]
+fn run_says_what_limits_do_and_draws_them() {
+    let here = TempDir::new().unwrap();
+    let robot = here.path().join("robot.toml");
+    fs::write(
+        &robot,
+        "limits.joint2.acceleration_deg_s2 = 400\nlimits.path.jerk_mm_s3 = 20000",
+    )
+    .unwrap();
+    let out = here.path().join("out");
+    let summary = json(&[
+        "run",
+        &corner_path(),
+        "--robot",
+        robot.to_str().unwrap(),
+        "--json",
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    assert!(out.join("limits.svg").is_file());
+    // FIR-ZVD has one box, and a jerk needs two
+    assert_eq!(summary["added_boxes_s"].as_array().unwrap().len(), 1);
+    let limits = summary["limits"].as_array().unwrap();
+    assert_eq!(limits.len(), 2);
+    assert_eq!(limits[0]["limit"], "joint 2 acceleration");
+    assert!(limits[0]["lowered_segments"].as_u64().unwrap() > 0);
+    for limit in limits {
+        let largest = limit["largest"].as_f64().unwrap();
+        assert!(
+            largest <= limit["allowed"].as_f64().unwrap() * 1.001,
+            "{limit}"
+        );
+    }
+}

@@ -109,6 +109,8 @@ pub enum HopError {
         /// Highest value.
         high: f32,
     },
+    /// Limits of motion are set, which a hop does not keep.
+    Limited,
     /// The vertical part is higher than the hop.
     Rise {
         /// Of the hop, in mm.
@@ -121,6 +123,9 @@ pub enum HopError {
 impl fmt::Display for HopError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Limited => f.write_str(
+                "limits of motion are set, which a hop does not keep: go up, across and down by G1 moves",
+            ),
             Self::Range {
                 name,
                 value,

@@ -3,6 +3,7 @@
 use super::config::Elbow;
 use super::delta::Delta;
 use super::pose_check::PoseError;
+use super::rate_bounds::RingBounds;
 use super::scara::Scara;
 use super::segment_check::{Curve, SegmentError};
 use crate::pose::{AXES, JointPosition, JointState, JointUnit, Pose};
@@ -115,6 +116,16 @@ impl Arm {
         match self {
             Self::Scara(scara) => scara.check_segment(curve),
             Self::Delta(delta) => delta.check_segment(curve),
+        }
+    }
+
+    /// The shape of the arm, for bounds on what its joints do: [`Scara::ring_bounds`]. None of
+    /// a delta robot, which does not look the same from every side.
+    #[must_use]
+    pub fn ring_bounds(&self) -> Option<RingBounds> {
+        match self {
+            Self::Scara(scara) => Some(scara.ring_bounds()),
+            Self::Delta(_) => None,
         }
     }
 

@@ -14,6 +14,7 @@ mod delta_check;
 mod delta_config;
 mod delta_forward;
 mod pose_check;
+mod rate_bounds;
 mod scara;
 mod segment_check;
 
@@ -22,5 +23,6 @@ pub use config::{Elbow, JointRange, ScaraConfig, ScaraError};
 pub use delta::Delta;
 pub use delta_config::{DeltaConfig, DeltaError};
 pub use pose_check::PoseError;
+pub use rate_bounds::{RateBounds, Ring, RingBounds};
 pub use scara::Scara;
 pub use segment_check::{Curve, SegmentError, Travel};

@@ -188,6 +188,17 @@ impl Prefilter {
         }
     }
 
+    /// The prefilter with one more box of `length_s`, the shorter boxes before the longer ones.
+    /// As it is if it has [`MAX_STAGES`].
+    #[must_use]
+    pub fn with_box(mut self, length_s: f64) -> Self {
+        let is_longer = |stage: &Stage| matches!(stage, Stage::Box(other) if *other > length_s);
+        let place = self.stages.iter().position(is_longer);
+        let place = place.unwrap_or(self.stages.len());
+        let _ = self.stages.insert(place, Stage::Box(length_s));
+        self
+    }
+
     /// The stages in the order in which they filter.
     #[must_use]
     pub fn stages(&self) -> &[Stage] {

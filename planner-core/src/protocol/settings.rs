@@ -103,7 +103,9 @@ pub struct Setting {
 }
 
 /// Names of the groups of settings.
-pub const GROUPS: [&str; 6] = ["Reports", "Safety", "Link", "Robot", "Motion", "Homing"];
+pub const GROUPS: [&str; 7] = [
+    "Reports", "Safety", "Link", "Robot", "Motion", "Homing", "Limits",
+];
 
 const REPORTS: u8 = 0;
 const SAFETY: u8 = 1;
@@ -111,6 +113,7 @@ const LINK: u8 = 2;
 const ROBOT: u8 = 3;
 const MOTION: u8 = 4;
 const HOMING: u8 = 5;
+const LIMITS: u8 = 6;
 
 const fn setting(
     number: u16,
@@ -159,7 +162,7 @@ const HOP_AXES: &[&str] = &{
 };
 
 /// The table, by number.
-pub const SETTINGS: [Setting; 74] = [
+pub const SETTINGS: [Setting; 92] = [
     setting(
         5,
         "inputs-inverted",
@@ -738,6 +741,150 @@ pub const SETTINGS: [Setting; 74] = [
         "",
         decimal(0.01, 0.5),
     ),
+    setting(
+        1200,
+        "joint1-velocity",
+        LIMITS,
+        "Joint 1 velocity, 0 unlimited",
+        "deg/s",
+        decimal(0.0, 1e6),
+    ),
+    setting(
+        1201,
+        "joint1-acceleration",
+        LIMITS,
+        "Joint 1 acceleration, 0 unlimited",
+        "deg/s2",
+        decimal(0.0, 1e7),
+    ),
+    setting(
+        1202,
+        "joint1-jerk",
+        LIMITS,
+        "Joint 1 jerk, 0 unlimited",
+        "deg/s3",
+        decimal(0.0, 1e9),
+    ),
+    setting(
+        1203,
+        "joint2-velocity",
+        LIMITS,
+        "Joint 2 velocity, 0 unlimited",
+        "deg/s",
+        decimal(0.0, 1e6),
+    ),
+    setting(
+        1204,
+        "joint2-acceleration",
+        LIMITS,
+        "Joint 2 acceleration, 0 unlimited",
+        "deg/s2",
+        decimal(0.0, 1e7),
+    ),
+    setting(
+        1205,
+        "joint2-jerk",
+        LIMITS,
+        "Joint 2 jerk, 0 unlimited",
+        "deg/s3",
+        decimal(0.0, 1e9),
+    ),
+    setting(
+        1206,
+        "joint3-velocity",
+        LIMITS,
+        "Joint 3 velocity, 0 unlimited",
+        "mm/s",
+        decimal(0.0, 1e6),
+    ),
+    setting(
+        1207,
+        "joint3-acceleration",
+        LIMITS,
+        "Joint 3 acceleration, 0 unlimited",
+        "mm/s2",
+        decimal(0.0, 1e7),
+    ),
+    setting(
+        1208,
+        "joint3-jerk",
+        LIMITS,
+        "Joint 3 jerk, 0 unlimited",
+        "mm/s3",
+        decimal(0.0, 1e9),
+    ),
+    setting(
+        1209,
+        "joint4-velocity",
+        LIMITS,
+        "Joint 4 velocity, 0 unlimited",
+        "deg/s",
+        decimal(0.0, 1e6),
+    ),
+    setting(
+        1210,
+        "joint4-acceleration",
+        LIMITS,
+        "Joint 4 acceleration, 0 unlimited",
+        "deg/s2",
+        decimal(0.0, 1e7),
+    ),
+    setting(
+        1211,
+        "joint4-jerk",
+        LIMITS,
+        "Joint 4 jerk, 0 unlimited",
+        "deg/s3",
+        decimal(0.0, 1e9),
+    ),
+    setting(
+        1212,
+        "path-velocity",
+        LIMITS,
+        "Path velocity, 0 unlimited",
+        "mm/s",
+        decimal(0.0, 1e6),
+    ),
+    setting(
+        1213,
+        "path-acceleration",
+        LIMITS,
+        "Path acceleration, 0 unlimited",
+        "mm/s2",
+        decimal(0.0, 1e7),
+    ),
+    setting(
+        1214,
+        "path-jerk",
+        LIMITS,
+        "Path jerk, 0 unlimited",
+        "mm/s3",
+        decimal(0.0, 1e9),
+    ),
+    setting(
+        1215,
+        "axis-velocity",
+        LIMITS,
+        "Axis velocity, 0 unlimited",
+        "mm/s",
+        decimal(0.0, 1e6),
+    ),
+    setting(
+        1216,
+        "axis-acceleration",
+        LIMITS,
+        "Axis acceleration, 0 unlimited",
+        "mm/s2",
+        decimal(0.0, 1e7),
+    ),
+    setting(
+        1217,
+        "axis-jerk",
+        LIMITS,
+        "Axis jerk, 0 unlimited",
+        "mm/s3",
+        decimal(0.0, 1e9),
+    ),
 ];
 
 /// Number and value of a setting, as kept.
@@ -1031,7 +1178,7 @@ mod tests {
                 "impulse5-weight",
                 "impulse5-ms",
             ];
-            if !is_plain.contains(&setting.name) {
+            if !is_plain.contains(&setting.name) && setting.group != LIMITS {
                 continue;
             }
             for (value, is_robot) in [(low, true), (high, true), (high * 1.01, false)] {

@@ -1,0 +1,361 @@
+//! How long a segment has to take.
+
+use super::config::{Bound, LimitsConfig, MotionLimits, Order, Part};
+use super::course::Course;
+use crate::config::RobotConfig;
+use crate::corner::CornerRule;
+use crate::kinematics::{Arm, RateBounds, Ring, RingBounds};
+use crate::math::sqrt_f32;
+use crate::prefilter::Prefilter;
+use crate::units::TICK_S;
+
+/// Kept of every limit for roundings: of weights to 2^-30, of rates to `f32`.
+const MARGIN: f32 = 0.9995;
+
+/// Evaluations after the first: each at least halves the logarithm of what is left to find.
+const ROUNDS: usize = 7;
+
+/// A duration found is at most so much longer than need be.
+const CLOSE: f32 = 1.005;
+
+/// Lengths of the boxes that a prefilter is given, in s: short enough to leave the robot
+/// quick, long enough to be many ticks.
+const BOX_S: (f64, f64) = (0.01, 0.2);
+
+/// Limits in mm, rad and s; infinite where there is none.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Highest {
+    pub velocity: f32,
+    pub acceleration: f32,
+    pub jerk: f32,
+}
+
+impl Highest {
+    fn new(limits: &MotionLimits, unit: f32) -> Self {
+        let value = |limit: f32| {
+            if limit > 0.0 {
+                limit * unit * MARGIN
+            } else {
+                f32::INFINITY
+            }
+        };
+        Self {
+            velocity: value(limits.velocity),
+            acceleration: value(limits.acceleration),
+            jerk: value(limits.jerk),
+        }
+    }
+}
+
+/// The limits of a robot with its prefilter, ready to time segments.
+#[derive(Clone, Debug)]
+pub struct Limits {
+    pub(super) joints: [Highest; 4],
+    pub(super) path: Highest,
+    pub(super) axis: Highest,
+    /// None of a robot that takes no limits.
+    arm: Option<RingBounds>,
+    pub(super) boxes: Boxes,
+    /// How far the command can be from a raw point of its window, in s of travel.
+    reach_s: f32,
+    /// No raw point is faster.
+    fastest_mm_s: f32,
+    /// Whether anything is limited.
+    is_set: bool,
+    boxes_needed: usize,
+}
+
+/// What the boxes make of a jump of the velocity.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Boxes {
+    /// Longest box in s; 0 if accelerations are not limited.
+    pub first_s: f32,
+    /// Second longest; 0 if jerks are not limited.
+    pub second_s: f32,
+    /// `1/T1` and `2/(T1 T2)`; 0 likewise.
+    pub per_first: f32,
+    pub per_both: f32,
+}
+
+/// How fast a segment is walked: its speed, and its loads for accelerations and for jerks.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Load {
+    pub speed: f32,
+    pub acceleration: f32,
+    pub jerk: f32,
+}
+
+impl Boxes {
+    /// The load of a segment of `length_mm`. However fast the raw path is, the box spreads the
+    /// length over its own, so that the curve is never taken faster than `L / T1`.
+    pub(super) fn load(&self, speed: f32, curvature: f32, length_mm: f32) -> Load {
+        let smoothed = speed.min(length_mm * self.per_first);
+        let turning = curvature * speed * smoothed;
+        let acceleration = speed + turning * self.first_s;
+        let both = self.first_s * self.second_s;
+        Load {
+            speed,
+            acceleration,
+            jerk: acceleration
+                + 1.5 * turning * self.second_s
+                + 0.5 * turning * curvature * smoothed * both,
+        }
+    }
+
+    /// By how much a thing that moves as the tool does, or a part of it, passes its limits.
+    pub(super) fn linear(&self, load: &Load, highest: &Highest) -> [f32; 3] {
+        [
+            load.speed / highest.velocity,
+            load.acceleration * self.per_first / highest.acceleration,
+            load.jerk * self.per_both / highest.jerk,
+        ]
+    }
+
+    /// Likewise a joint with these bounds.
+    fn turning(&self, load: &Load, bounds: &RateBounds, highest: &Highest) -> [f32; 3] {
+        let RateBounds {
+            first,
+            second,
+            third,
+        } = *bounds;
+        let (a, j) = (load.acceleration, load.jerk);
+        [
+            first * load.speed / highest.velocity,
+            (first * self.per_first + second * a) * a / highest.acceleration,
+            (first * self.per_both + (3.0 * second * self.per_first + third * j) * j) * j
+                / highest.jerk,
+        ]
+    }
+}
+
+/// The prefilter with the boxes that limits need: as it is, if it has them.
+///
+/// A box that is missing gets the length with which a rapid just keeps the limits with the
+/// forearm square to the upper arm, within 10 and 200 ms.
+#[must_use]
+pub fn with_boxes(
+    prefilter: Prefilter,
+    config: &LimitsConfig,
+    arm: &Arm,
+    rapid_mm_s: f32,
+) -> Prefilter {
+    let needed = config.boxes_needed();
+    let present = prefilter.boxes_s().len();
+    let mut prefilter = prefilter;
+    if present < 1 && needed >= 1 {
+        let quotient = worst_quotient(config, arm, |limits| limits.acceleration);
+        prefilter = prefilter.with_box(f64::from(rapid_mm_s * quotient).clamp(BOX_S.0, BOX_S.1));
+    }
+    if present < 2 && needed >= 2 {
+        let quotient = worst_quotient(config, arm, |limits| limits.jerk);
+        let first_s = prefilter.longest_box_s().unwrap_or(BOX_S.1);
+        let second_s = f64::from(2.0 * rapid_mm_s * quotient) / first_s;
+        prefilter = prefilter.with_box(second_s.clamp(BOX_S.0, BOX_S.1));
+    }
+    prefilter
+}
+
+/// The largest quotient of what a tool's mm moves and what is allowed of it.
+fn worst_quotient(config: &LimitsConfig, arm: &Arm, limit: impl Fn(&MotionLimits) -> f32) -> f32 {
+    let shape = arm.ring_bounds();
+    let [first, second, both] = shape.map_or([0.0; 3], |shape| shape.square());
+    let quotient = |(part, limits): (Part, &MotionLimits)| {
+        let per_mm = match part {
+            Part::Joint(1) => first.to_degrees(),
+            Part::Joint(2) => second.to_degrees(),
+            Part::Joint(4) => both.to_degrees(),
+            Part::Joint(_) | Part::Path | Part::Axis => 1.0,
+        };
+        let limit = limit(limits);
+        if limit > 0.0 { per_mm / limit } else { 0.0 }
+    };
+    config.all().map(quotient).fold(0.0, f32::max)
+}
+
+impl Limits {
+    /// The limits of a robot with this arm and prefilter. The prefilter has the boxes that
+    /// they need: see [`with_boxes`].
+    #[must_use]
+    pub fn new(robot: &RobotConfig, arm: &Arm, prefilter: &Prefilter) -> Self {
+        let config = &robot.limits;
+        let mut joints = config.joints.map(|l| Highest::new(&l, 1_f32.to_radians()));
+        joints[2] = Highest::new(&config.joints[2], 1.0);
+        let needed = config.boxes_needed();
+        let boxes_s = prefilter.boxes_s();
+        let mut longest = boxes_s.iter().map(|s| *s as f32);
+        let first_s = longest.next().filter(|_| needed >= 1).unwrap_or(0.0);
+        let second_s = longest.next().filter(|_| needed >= 2).unwrap_or(0.0);
+        let inverse = |s: f32| if s > 0.0 { 1.0 / s } else { 0.0 };
+        let mean_s = prefilter.centroid_s();
+        let furthest_s = mean_s.max(prefilter.length_s() - mean_s);
+        Self {
+            joints,
+            path: Highest::new(&config.path, 1.0),
+            axis: Highest::new(&config.axis, 1.0),
+            arm: arm.ring_bounds(),
+            boxes: Boxes {
+                first_s,
+                second_s,
+                per_first: inverse(first_s),
+                per_both: 2.0 * inverse(first_s * second_s),
+            },
+            // and two ticks that a setpoint is behind
+            reach_s: (furthest_s + 2.0 * TICK_S) as f32,
+            fastest_mm_s: robot.feed_limit_mm_s,
+            is_set: *config != LimitsConfig::default(),
+            boxes_needed: needed,
+        }
+    }
+
+    /// Whether anything is limited.
+    #[must_use]
+    pub const fn is_set(&self) -> bool {
+        self.is_set
+    }
+
+    /// How long the raw path stands at a corner that no pair of instants may span, in s; 0 if
+    /// any corner will do.
+    #[must_use]
+    pub fn stop_s(&self) -> f32 {
+        match self.boxes_needed {
+            0 => 0.0,
+            // and two ticks over which the boxes' edges are spread
+            _ => self.boxes.first_s + self.boxes.second_s + 2.0 * TICK_S as f32,
+        }
+    }
+
+    /// Whether single axes are limited, so that corners may not reverse them.
+    pub(super) fn limits_axes(&self) -> bool {
+        self.axis.acceleration.is_finite() || self.axis.jerk.is_finite()
+    }
+
+    /// Whether turning the yaw is limited by more than its speed.
+    pub(super) fn limits_yaw(&self) -> bool {
+        let [.., joint4] = &self.joints;
+        joint4.acceleration.is_finite() || joint4.jerk.is_finite()
+    }
+
+    /// Lengths of upper arm and forearm.
+    pub(super) fn links_mm(&self) -> (f32, f32) {
+        self.arm.map_or((0.0, 0.0), |arm| arm.links_mm())
+    }
+
+    /// The rule that a corner may have so that the command keeps away from the folded arm: a
+    /// tolerance of half of what the singularity margin leaves, and of what the path itself keeps
+    /// from it. A given overlap promises nothing, and stays.
+    #[must_use]
+    pub fn rule(&self, rule: CornerRule, innermost_mm: f32) -> CornerRule {
+        let (CornerRule::ToleranceMm(tolerance_mm), Some(arm)) = (rule, self.arm) else {
+            return rule;
+        };
+        let kept_mm = innermost_mm - arm.programmed().inner_mm;
+        let spare_mm = arm.spare_mm() + kept_mm.max(0.0);
+        CornerRule::ToleranceMm(tolerance_mm.min(spare_mm))
+    }
+
+    /// The shortest duration in s that keeps the limits while the segment is walked alone, and
+    /// the limit that sets it; 0 if the segment may take half of `asked_s`.
+    ///
+    /// At most 0.5 % longer than need be, mostly. Cost on a Cortex-M4F: below 20 000 instructions.
+    #[must_use]
+    pub fn least_s(&self, course: &Course, asked_s: f32) -> (f32, Option<Bound>) {
+        if !self.is_set {
+            return (0.0, None);
+        }
+        let yaw_s = self.yaw_s(course);
+        let hurried_s = 0.5 * asked_s - yaw_s;
+        let (overload, mut bound) = self.overload(course, hurried_s);
+        if overload <= 1.0 {
+            return (0.0, None);
+        }
+        let (mut low_s, mut high_s) = (hurried_s.max(0.0), f32::INFINITY);
+        if low_s > 0.0 {
+            high_s = low_s * overload;
+        }
+        for _ in 0..ROUNDS {
+            if high_s <= low_s * CLOSE {
+                break;
+            }
+            let middle_s = match (low_s > 0.0, high_s.is_finite()) {
+                (true, true) => sqrt_f32(low_s * high_s),
+                (false, true) => 0.5 * high_s,
+                // any duration serves to begin with
+                (_, false) => asked_s,
+            };
+            let (overload, by) = self.overload(course, middle_s);
+            bound = by;
+            // Overloads grow at least as the speed does: a duration times its overload keeps the
+            // limits if that is above 1, and does not if it is below.
+            let scaled_s = middle_s * overload;
+            low_s = low_s.max(middle_s.min(scaled_s));
+            high_s = high_s.min(middle_s.max(scaled_s));
+        }
+        (high_s + yaw_s, bound)
+    }
+
+    /// How long the yaw alone takes at the limits of joint 4.
+    fn yaw_s(&self, course: &Course) -> f32 {
+        let load = self.boxes.load(course.yaw_rad, 0.0, 0.0);
+        largest(Part::Joint(4), self.boxes.linear(&load, &self.joints[3])).0
+    }
+
+    /// The largest quotient of what a segment that takes `duration_s` may make of something, and
+    /// the limit of that; infinite without a duration.
+    fn overload(&self, course: &Course, duration_s: f32) -> (f32, Option<Bound>) {
+        if duration_s <= 0.0 {
+            return (f32::INFINITY, None);
+        }
+        let per_s = 1.0 / duration_s;
+        let boxes = &self.boxes;
+        let load =
+            |way_mm: f32| boxes.load(way_mm * per_s, course.curvature_per_mm, course.plane_mm);
+        let [x_mm, y_mm, z_mm] = course.axes_mm;
+        let straight = boxes.load(z_mm * per_s, 0.0, 0.0);
+        let mut worst = (0.0, None);
+        let mut take = |found: (f32, Bound)| {
+            if found.0 > worst.0 {
+                worst = (found.0, Some(found.1));
+            }
+        };
+        take(largest(
+            Part::Path,
+            boxes.linear(&load(course.length_mm), &self.path),
+        ));
+        let plane = boxes.linear(&load(x_mm.max(y_mm)), &self.axis);
+        take(largest(Part::Axis, plane));
+        take(largest(Part::Axis, boxes.linear(&straight, &self.axis)));
+        take(largest(
+            Part::Joint(3),
+            boxes.linear(&straight, &self.joints[2]),
+        ));
+        let load = load(course.plane_mm);
+        let reach_mm = load.jerk.min(self.fastest_mm_s) * self.reach_s;
+        let ring = Ring {
+            inner_mm: course.ring.inner_mm - reach_mm,
+            outer_mm: course.ring.outer_mm + reach_mm,
+        };
+        let bounds = self.arm.map(|arm| arm.within(ring)).unwrap_or_default();
+        let [joint1, joint2, _, joint4] = &self.joints;
+        let turning = [(1, joint1), (2, joint2), (4, joint4)];
+        for ((joint, highest), bounds) in turning.into_iter().zip(&bounds) {
+            take(largest(
+                Part::Joint(joint),
+                boxes.turning(&load, bounds, highest),
+            ));
+        }
+        worst
+    }
+}
+
+/// The largest of the quotients for velocity, acceleration and jerk.
+pub(super) fn largest(part: Part, quotients: [f32; 3]) -> (f32, Bound) {
+    let [velocity, acceleration, jerk] = quotients;
+    let found = |order| Bound { part, order };
+    if jerk > velocity.max(acceleration) {
+        (jerk, found(Order::Jerk))
+    } else if acceleration > velocity {
+        (acceleration, found(Order::Acceleration))
+    } else {
+        (velocity, found(Order::Velocity))
+    }
+}

@@ -1,0 +1,62 @@
+//! How long a move of the joints has to take.
+
+use super::config::{Bound, Part};
+use super::feed::{Limits, largest};
+
+impl Limits {
+    /// The shortest duration in s, `asked_s` or more, in which joints may go from rest to rest by
+    /// `ways` (rad, rad, mm, rad), each at constant speed.
+    ///
+    /// For the joints' own limits it is exact. The tool's limits are kept by bounds that hold
+    /// in every posture, since where the arm homes the posture is not known: with
+    /// `ω = |θ̇1| + |θ̇2|` the tool moves by `l1 |θ̇1| + l2 ω`, and each link adds `l ω²` to the
+    /// acceleration and `3 l ω ω̇ + l ω³` to the jerk.
+    #[must_use]
+    pub fn joint_move_s(&self, ways: [f32; 4], asked_s: f32) -> (f32, Option<Bound>) {
+        if !self.is_set() {
+            return (asked_s, None);
+        }
+        let per_s = 1.0 / asked_s;
+        let mut worst: (f32, Option<Bound>) = (1.0, None);
+        let mut take = |found: (f32, Bound)| {
+            if found.0 > worst.0 {
+                worst = (found.0, Some(found.1));
+            }
+        };
+        for ((joint, way), highest) in (1..).zip(ways).zip(&self.joints) {
+            let load = self.boxes.load(way.abs() * per_s, 0.0, 0.0);
+            take(largest(
+                Part::Joint(joint),
+                self.boxes.linear(&load, highest),
+            ));
+        }
+        let [way1, way2, way3, _] = ways.map(f32::abs);
+        let (link1_mm, link2_mm) = self.links_mm();
+        let (turn1, turn12) = (way1 * per_s, (way1 + way2) * per_s);
+        let (per_first, per_both) = (self.boxes.per_first, self.boxes.per_both);
+        let (mut velocity, mut acceleration, mut jerk) = (0.0, 0.0, 0.0);
+        for (link_mm, turn) in [(link1_mm, turn1), (link2_mm, turn12)] {
+            velocity += link_mm * turn;
+            acceleration += link_mm * turn * (per_first + turn);
+            jerk += link_mm * turn * (per_both + turn * (3.0 * per_first + turn));
+        }
+        let lift = way3 * per_s;
+        let sum = [
+            velocity + lift,
+            acceleration + lift * per_first,
+            jerk + lift * per_both,
+        ];
+        for (part, highest) in [(Part::Path, &self.path), (Part::Axis, &self.axis)] {
+            let [velocity, acceleration, jerk] = sum;
+            take(largest(
+                part,
+                [
+                    velocity / highest.velocity,
+                    acceleration / highest.acceleration,
+                    jerk / highest.jerk,
+                ],
+            ));
+        }
+        (asked_s * worst.0, worst.1)
+    }
+}

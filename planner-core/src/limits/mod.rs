@@ -1,0 +1,77 @@
+//! Limits of velocity, acceleration and jerk: of the joints, along the path, along the axes.
+//!
+//! They hold at every tick, by the feed that a segment gets and by the time that the raw path
+//! stands at its corners. Nothing looks ahead: a segment is timed when its line comes, from
+//! itself and what came before it.
+//!
+//! # What the command does
+//! The raw path moves with speed `F` or stands. The prefilter has boxes of length `T1 ≥ T2`; the
+//! command's place c is a mean of raw points over the last `T_h`, and with `v` the raw velocity
+//!
+//! ```text
+//! ċ  = mean of v                                       |ċ| ≤ max F
+//! c̈  = mean of [v(t) − v(t − T1)] / T1                 |c̈| ≤ max Δ / T1
+//! c⃛  = mean of [Δ(t) − Δ(t − T2)] / (T1 T2)            |c⃛| ≤ 2 max Δ / (T1 T2)
+//! ```
+//!
+//! where `Δ = |v(t) − v(t − T1)|` is at most `F` while only one segment is started, held and
+//! resumed, as often as one likes. On an arc of curvature κ the *progress* is filtered, and the
+//! curve adds `κF²` to c̈ and `3κF·F/T1 + κ²F³` to c⃛. Both are put into one number, the **load**
+//!
+//! ```text
+//! e = F + κF² T1 for accelerations,   e = F + 3/2 κF² T2 + κF² T1 + ½ κ²F³ T1 T2 for jerks:
+//! |c̈| ≤ e / T1,   |c⃛| ≤ 2e / (T1 T2)
+//! ```
+//!
+//! (On an arc shorter than `F T1` one factor F of κF², two of κ²F³, are its length by `T1`: the box
+//! spreads it.)
+//!
+//! # The condition on a segment
+//! With the bounds g, h and d of [`crate::kinematics::RateBounds`] each joint keeps its limits if
+//!
+//! ```text
+//! g F ≤ V,   g e/T1 + h e² ≤ A,   g 2e/(T1 T2) + 3h e²/T1 + d e³ ≤ J
+//! ```
+//!
+//! wherever the command can be. **It is required wherever the tool is within `e·m` of the
+//! segment** (within `F_max m` if that is less, `F_max` the robot's fastest feedrate), m the largest
+//! mean delay of the prefilter seen from either end. That is enough
+//! without knowing what follows: of the segments that move the raw point within a window of
+//! `T_h` take the one with the largest load e*. All loads and speeds are at most e*, so the
+//! command is within `e*·m` of every raw point of the window, hence of that segment; there its
+//! condition bounds the joints for load e*, the more so for what the window really holds.
+//!
+//! Joint 4 is `c − θ1 − θ2`. The yaw's part of its limits and the tool's add up: the duration is
+//! that for the tool alone and that for the yaw alone together. All left sides grow at least in proportion
+//! to the duration's inverse, so that shares of a limit add up to at most the whole also where
+//! several segments share a window.
+//!
+//! # Corners
+//! The above needs `Δ ≤ e` across corners too. It holds
+//! - if the raw path stands for `T1` (for `T1 + T2` with a limit of jerk): then every pair of
+//!   instants sees one segment only;
+//! - if each of the segments keeps the limits at **twice** its load: Δ is at most the sum;
+//! - between lines that turn, all corners together that a pair of instants can span, by at most
+//!   60°: then `|v₂ − v₁| ≤ max F`. No axis may reverse in between and no yaw turn.
+//!
+//! [`Run`] keeps what is needed of the past, and chooses for each segment what is fastest:
+//! its full feed with a stop where one must be, or half of it and no stop.
+//!
+//! # Never a stall
+//! Conditions only get easier as the duration grows, and hold in the limit: the region shrinks to
+//! the segment, over which the bounds are finite because the singularity margin has been
+//! checked. A duration times the largest quotient of left and right side always keeps them.
+//!
+//! Overrides above 100 % are capped at the duration that keeps the limits; below, and in holds,
+//! everything only gets slower.
+
+mod config;
+mod course;
+mod feed;
+mod joint_move;
+mod run;
+
+pub use config::{Bound, Limited, LimitsConfig, MotionLimits, Order, Part};
+pub use course::Course;
+pub use feed::{Limits, with_boxes};
+pub use run::{Choice, Run};
