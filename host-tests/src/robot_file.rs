@@ -159,6 +159,7 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
                 vec!["prefilter.smoothing1_ms", "prefilter.smoothing2_ms"]
             }
             PrefilterError::TooLong { .. } => vec!["prefilter.frequency_hz", "prefilter.name"],
+            PrefilterError::TooManyKinks => vec!["prefilter.impulses", "prefilter.name"],
         },
         ConfigError::Follow(error) => match error {
             FollowError::Map(MapError::Size { .. }) => vec!["map.columns", "map.rows"],

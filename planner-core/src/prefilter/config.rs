@@ -216,6 +216,8 @@ pub enum PrefilterError {
         /// The filter's length.
         length_s: f32,
     },
+    /// The response has more kinks than there is room for.
+    TooManyKinks,
 }
 
 impl fmt::Display for PrefilterError {
@@ -263,6 +265,9 @@ impl fmt::Display for PrefilterError {
             Self::TooLong { length_s } => write!(
                 f,
                 "the prefilter is {length_s:.3} s long and the delay line holds 1 s: choose a shorter prefilter or a higher frequency"
+            ),
+            Self::TooManyKinks => f.write_str(
+                "the prefilter's response has more than 50 kinks: give fewer impulses or fewer boxes",
             ),
         }
     }

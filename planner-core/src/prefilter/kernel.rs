@@ -2,6 +2,7 @@
 
 use heapless::Vec;
 
+use super::response::has_room_for;
 use super::{Impulse, Impulses, MAX_STAGES, Mode, Prefilter, PrefilterError, Stage};
 use crate::raw::{ONE_TICK, TickTime, tick_time};
 use crate::units::{TICK_HZ, TICK_S};
@@ -118,8 +119,12 @@ impl Kernel {
     /// The taps of a prefilter.
     ///
     /// # Errors
-    /// [`PrefilterError::TooLong`] if the filter does not fit the delay line.
+    /// [`PrefilterError::TooLong`] if the filter does not fit the delay line,
+    /// [`PrefilterError::TooManyKinks`] if its response has too many pieces.
     pub fn new(prefilter: &Prefilter) -> Result<Self, PrefilterError> {
+        if !has_room_for(prefilter.stages()) {
+            return Err(PrefilterError::TooManyKinks);
+        }
         let too_long = PrefilterError::TooLong {
             length_s: prefilter.length_s() as f32,
         };

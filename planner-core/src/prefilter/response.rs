@@ -4,9 +4,9 @@ use heapless::Vec;
 
 use super::{Impulses, Stage};
 
-/// Breakpoints of a response. The most that settings can ask for are five impulses for each of
-/// two modes and two boxes, `5 · 5 · 2 · 2`.
-const MAX_BREAKS: usize = 100;
+/// Breakpoints of a response: FIR-3-hump-EI for each of two modes has 49. A cascade with more is
+/// refused when its taps are made; a response of 100 pieces would cost 1.4 KiB more each.
+const MAX_BREAKS: usize = 50;
 
 /// Boxes of a cascade: S-curves for two modes have four.
 const MAX_BOXES: usize = 4;
@@ -146,6 +146,19 @@ pub(crate) fn boxes(stages: &[Stage]) -> usize {
     stages.iter().filter(is_box).count()
 }
 
+/// Whether a response has room for the breakpoints of a cascade.
+pub(super) fn has_room_for(stages: &[Stage]) -> bool {
+    let apart: usize = stages
+        .iter()
+        .map(|stage| match stage {
+            Stage::Box(_) | Stage::Zv(_) => 2,
+            Stage::Impulses(list) => list.iter().count(),
+        })
+        .product();
+    // not all of them need be apart; at the last place there may be one too many
+    apart <= MAX_BREAKS || terms(stages, false).len() < MAX_BREAKS
+}
+
 /// The terms of a cascade's ramp response, or of that run backwards.
 pub(crate) fn terms(stages: &[Stage], reversed: bool) -> Terms {
     let mut terms = Terms::new();
@@ -187,7 +200,7 @@ fn add(terms: &mut Vec<Term, MAX_BREAKS>, term: Term) {
         .find(|other| libm::fabs(other.b - term.b) < SAME_TIME_S)
     {
         Some(same) => same.c += term.c,
-        // there is room, see the capacity
+        // of what has no room no taps are made
         None => drop(terms.push(term)),
     }
 }
