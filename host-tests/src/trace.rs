@@ -263,7 +263,7 @@ fn last_change(setpoints: &[Setpoint]) -> usize {
 }
 
 /// A setpoint's pose: mm and degrees.
-fn pose(setpoint: &Setpoint) -> [f64; 4] {
+pub fn pose(setpoint: &Setpoint) -> [f64; 4] {
     let pose = setpoint.pose;
     [
         pose.x.to_num(),

@@ -2,9 +2,10 @@
 //! checker; and nothing stalls because of them.
 
 use host_tests::checker::limits::{Arm, JointRow, Rates, rates};
+use host_tests::checker::{CheckOptions, Program, TraceRow, check};
 use host_tests::random_program::{Shape, random_program};
 use host_tests::software_loop::{Controller, run};
-use host_tests::trace::joints;
+use host_tests::trace::{joints, pose};
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::kinematics::JointRange;
 use planner_core::limits::{LimitsConfig, MotionLimits};
@@ -400,6 +401,40 @@ fn no_limit_is_passed_with_holds_and_overrides() {
             &all,
             450.0,
             &format!("seed {seed}, {kind:?}\n{program}"),
+        );
+    }
+}
+
+#[test]
+fn the_tolerance_holds_with_limits_too() {
+    for seed in 0..40 {
+        let kind = [Kind::Fir, Kind::FirZv, Kind::FirZvd, Kind::Zv][seed as usize % 4];
+        let robot = with_limits(kind, MANY);
+        let shape = Shape {
+            tolerances: false,
+            smooth: if seed % 3 == 0 { 0.9 } else { 0.3 },
+            ..Shape::default()
+        };
+        let program = random_program(seed, shape);
+        let rows: Vec<_> = setpoints(&robot, &program)
+            .iter()
+            .zip(0_u32..)
+            .map(|(setpoint, tick)| TraceRow {
+                time_s: f64::from(tick) * 1e-3,
+                pose: pose(setpoint),
+            })
+            .collect();
+        let options = CheckOptions {
+            rapid_mm_s: 160.0,
+            tolerance_mm: robot.config.corner_tolerance_mm.into(),
+            ..CheckOptions::default()
+        };
+        let parsed = Program::parse(&program).expect("the checker reads it");
+        let report = check(&parsed, &rows, &options);
+        assert!(
+            report.max_path_deviation_mm <= options.tolerance_mm + 1e-3,
+            "seed {seed}, {kind:?}: {} mm\n{program}",
+            report.max_path_deviation_mm
         );
     }
 }
