@@ -49,7 +49,7 @@ pub fn hops(program: &str, defaults: HopDefaults) -> Option<Vec<Hop>> {
         let text = line.split([';', '(']).next().unwrap_or_default();
         let words: Vec<_> = text.split_ascii_whitespace().collect();
         let unread = |word: &&str| word.starts_with(['G', 'M']) && !READ.contains(word);
-        if words.iter().any(|word| unread(word)) {
+        if words.iter().any(unread) {
             return None;
         }
         let value = |letter: char| {
