@@ -12,7 +12,7 @@ use firmware::tasks::control::Frames;
 use firmware::tasks::link::Link;
 use firmware::tasks::{command, control, setpoints};
 use planner_core::config::Robot;
-use planner_core::motion::{DelayLines, Motion};
+use planner_core::motion::{DelayLines, Motion, MotionSettings};
 use planner_core::planner::Planner;
 use planner_core::protocol::{Controller, Identity, Settings};
 use planner_core::queue::SegmentQueue;
@@ -38,7 +38,7 @@ fn start() -> Commands<CommandIn, CommandOut, BoardFlash> {
     static SEGMENTS: ConstStaticCell<SegmentQueue> = ConstStaticCell::new(SegmentQueue::new());
     static FILTERS: ConstStaticCell<DelayLines> = ConstStaticCell::new(DelayLines::new());
     static CONTROLLER: StaticCell<Controller<'static>> = StaticCell::new();
-    static ROBOT: StaticCell<Robot> = StaticCell::new();
+    static ROBOT: StaticCell<MotionSettings> = StaticCell::new();
 
     let Board {
         command_in,
@@ -53,10 +53,8 @@ fn start() -> Commands<CommandIn, CommandOut, BoardFlash> {
         setpoints,
     } = board::start();
     let settings = Settings::default();
-    let robot = ROBOT.init_with(|| {
-        let robot = Robot::new(&settings.robot);
-        defmt::expect!(robot.ok(), "the default settings are a robot")
-    });
+    let robot = Robot::new(&settings.robot);
+    let robot = &defmt::expect!(robot.ok(), "the default settings are a robot");
     let link: &Link = LINK.init(Link::default());
     let frames: &Frames = FRAMES.init(Frames::new());
     let (to_motion, from_planner) = SEGMENTS.take().split();
@@ -81,7 +79,7 @@ fn start() -> Commands<CommandIn, CommandOut, BoardFlash> {
         input: command_in,
         output: command_out,
         controller,
-        robot,
+        robot: ROBOT.init(MotionSettings::from(robot)),
         link,
         store: defmt::expect!(Store::new(flash, board::STORE), "the store is whole pages"),
     }

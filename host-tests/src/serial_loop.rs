@@ -223,7 +223,7 @@ impl SerialLoop<'_> {
                 self.output.extend_from_slice(text.as_bytes());
             }
             Step::Order(order) => self.obey(order),
-            Step::Robot => self.motion.set_robot(self.controller.robot()),
+            Step::Robot => self.motion.set_robot(&self.controller.robot().into()),
             Step::Keep(record) => {
                 let mut buffer = [0; RECORD_BYTES];
                 let bytes = self.controller.record(record, &mut buffer).to_vec();

@@ -105,7 +105,7 @@ impl<'q> Controller<'q> {
     /// Changes the settings, between two programs.
     pub fn set_robot(&mut self, robot: &Robot) {
         self.planner.set_robot(robot);
-        self.motion.set_robot(robot);
+        self.motion.set_robot(&robot.into());
     }
 
     /// The planner, for what no line says.

@@ -6,7 +6,7 @@ use crate::config::Robot;
 use crate::joint_space::{self, Space};
 use crate::kinematics::{Arm, ArmKind, Elbow};
 use crate::pose::{AXES, JointPosition, JointState, Pose};
-use crate::prefilter::{Convolver, ConvolverPair, FINE_BITS};
+use crate::prefilter::{Convolver, ConvolverPair, FINE_BITS, Kernel};
 use crate::queue::{Action, RawItem, SegmentConsumer};
 use crate::rate::Rate;
 use crate::raw::TickTime;
@@ -96,6 +96,25 @@ pub struct Progress {
 struct Seek {
     joint: u8,
     active: bool,
+}
+
+/// What the motion has to know of a robot: so little that it can be handed over.
+#[derive(Clone, Debug)]
+pub struct MotionSettings {
+    kernel: Kernel,
+    arm: Arm,
+    /// Whether prefilters change on the way.
+    changes_over: bool,
+}
+
+impl From<&Robot> for MotionSettings {
+    fn from(robot: &Robot) -> Self {
+        Self {
+            kernel: robot.kernel.clone(),
+            arm: robot.arm.clone(),
+            changes_over: robot.follower.is_some(),
+        }
+    }
 }
 
 /// The delay lines of the filters: most of the core's memory, 25 KiB, apart from [`Motion`] so
@@ -226,13 +245,13 @@ impl<'q> Motion<'q> {
     }
 
     /// Changes the robot's settings. Only while idle; otherwise nothing happens.
-    pub fn set_robot(&mut self, robot: &Robot) {
+    pub fn set_robot(&mut self, robot: &MotionSettings) {
         if self.mode == Mode::Idle {
             let pose = self.pose();
             let joints = self.kinematics.inverse(&pose);
             let kind = self.kinematics.kind();
             self.changeover.set_kernel(robot.kernel.clone());
-            self.filters.lines.share(robot.follower.is_some());
+            self.filters.lines.share(robot.changes_over);
             self.kinematics = robot.arm.clone();
             self.rest_at(self.nearest_point());
             // Another arm at the same pose, or with joints of another kind.

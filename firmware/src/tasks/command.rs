@@ -4,7 +4,7 @@ use core::fmt::Debug;
 
 use embassy_time::{Duration, Instant, with_deadline};
 use embedded_storage_async::nor_flash::NorFlash;
-use planner_core::config::Robot;
+use planner_core::motion::MotionSettings;
 use planner_core::protocol::{Controller, RECORD_BYTES, Record, Step};
 use planner_core::store::{BUFFER_BYTES, Buffer, Damaged, Store};
 
@@ -22,8 +22,8 @@ pub struct Commands<I, O, F: NorFlash> {
     pub output: O,
     /// Decides.
     pub controller: &'static mut Controller<'static>,
-    /// The place in which a robot with new settings travels to the control task and back.
-    pub robot: &'static mut Robot,
+    /// The place in which new settings of the robot travel to the control task and back.
+    pub robot: &'static mut MotionSettings,
     /// To the control task.
     pub link: &'static Link,
     /// What outlasts power-off.
@@ -52,7 +52,7 @@ pub async fn run<F: NorFlash<Error: Debug>>(commands: Commands<impl ByteIn, impl
             Step::Say(text) => output.write_all(text.as_bytes()).await,
             Step::Order(order) => link.order(order).await,
             Step::Robot => {
-                robot.clone_from(controller.robot());
+                *robot = MotionSettings::from(controller.robot());
                 robot = link.exchange_robot(robot).await;
             }
             Step::Keep(record) => {

@@ -6,17 +6,16 @@ use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
-use planner_core::config::Robot;
-use planner_core::motion;
+use planner_core::motion::{self, MotionSettings};
 use planner_core::protocol::Report;
 
 /// What the command task asks of the control task. Obeyed in order, before the next tick.
 pub enum Order {
     /// To the motion.
     Motion(motion::Order),
-    /// Other settings, in the one place they have; it goes back with
+    /// Other settings of the robot, in the one place they have; it goes back with
     /// [`Link::return_robot`]. At rest only.
-    Robot(&'static mut Robot),
+    Robot(&'static mut MotionSettings),
 }
 
 /// Orders under way: a place and a start may follow each other within a period.
@@ -32,7 +31,7 @@ pub struct Link {
 }
 
 type Orders = Channel<CriticalSectionRawMutex, Order, ORDERS>;
-type Robots = Channel<CriticalSectionRawMutex, &'static mut Robot, 1>;
+type Robots = Channel<CriticalSectionRawMutex, &'static mut MotionSettings, 1>;
 
 impl Default for Link {
     fn default() -> Self {
@@ -54,7 +53,10 @@ impl Link {
 
     /// Command task: other settings, in the one place they have; comes back when they are in
     /// force.
-    pub async fn exchange_robot(&self, robot: &'static mut Robot) -> &'static mut Robot {
+    pub async fn exchange_robot(
+        &self,
+        robot: &'static mut MotionSettings,
+    ) -> &'static mut MotionSettings {
         self.orders.send(Order::Robot(robot)).await;
         self.robots.receive().await
     }
@@ -81,7 +83,7 @@ impl Link {
     }
 
     /// Control task: gives the robot back. There is only one, so there is room for it.
-    pub fn return_robot(&self, robot: &'static mut Robot) {
+    pub fn return_robot(&self, robot: &'static mut MotionSettings) {
         let returned = self.robots.try_send(robot);
         debug_assert!(returned.is_ok());
     }

@@ -1,7 +1,7 @@
 //! The prefilter at run time: a delay line and, for each box, a running sum.
 
 use super::MAX_STAGES;
-use super::kernel::{HALF_SLOTS, Kernel, SLOTS, Tap, Taps, WEIGHT_BITS};
+use super::kernel::{HALF_SLOTS, Kernel, SLOTS, Shape, Tap, WEIGHT_BITS};
 
 /// The output has this many bits below the input's.
 pub const FINE_BITS: u32 = 13;
@@ -174,6 +174,7 @@ impl<const AXES: usize> Filter<AXES> {
     ) -> [i64; AXES] {
         self.head = self.head.wrapping_sub(1);
         let mut total = input.map(|value| i64::from(value) << WEIGHT_BITS);
+        let mut taps = kernel.taps.as_slice();
         for (stage, sums) in kernel.stages.iter().zip(&mut self.sums) {
             let newest = part.slot(self.head.wrapping_add(usize::from(stage.first_slot)));
             line[newest] = total.map(|value| round_off(value, WEIGHT_BITS) as i32);
@@ -184,13 +185,13 @@ impl<const AXES: usize> Filter<AXES> {
                 age: self.age,
                 rest: &self.rest,
             };
-            total = match &stage.taps {
-                Taps::Two(taps) => delayed.weighted(taps, [0; AXES]),
-                Taps::Three(taps) => delayed.weighted(taps, [0; AXES]),
-                Taps::Four(taps) => delayed.weighted(taps, [0; AXES]),
-                Taps::Five(taps) => delayed.weighted(taps, [0; AXES]),
-                Taps::Box(taps) => {
-                    *sums = delayed.weighted(taps, *sums);
+            total = match stage.shape {
+                Shape::Two => delayed.weighted::<3>(&mut taps, [0; AXES]),
+                Shape::Three => delayed.weighted::<5>(&mut taps, [0; AXES]),
+                Shape::Four => delayed.weighted::<7>(&mut taps, [0; AXES]),
+                Shape::Five => delayed.weighted::<9>(&mut taps, [0; AXES]),
+                Shape::Box => {
+                    *sums = delayed.weighted::<5>(&mut taps, *sums);
                     *sums
                 }
             };
@@ -210,8 +211,12 @@ struct Delayed<'a, const AXES: usize> {
 }
 
 impl<const AXES: usize> Delayed<'_, AXES> {
-    /// `sum` and the weighted samples, in 2^-30 of the input's unit.
-    fn weighted<const TAPS: usize>(&self, taps: &[Tap; TAPS], mut sum: [i64; AXES]) -> [i64; AXES] {
+    /// `sum` and the samples weighted by the next taps, in 2^-30 of the input's unit.
+    fn weighted<const TAPS: usize>(&self, left: &mut &[Tap], mut sum: [i64; AXES]) -> [i64; AXES] {
+        let Some((taps, others)) = left.split_first_chunk::<TAPS>() else {
+            return sum;
+        };
+        *left = others;
         let samples: [&[i32; AXES]; TAPS] = core::array::from_fn(|i| {
             let tap = &taps[i];
             if usize::from(tap.delay) <= self.age {

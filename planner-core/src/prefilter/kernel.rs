@@ -33,58 +33,48 @@ pub(super) struct Tap {
     pub weight: i32,
 }
 
-/// The taps of one stage.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Taps {
-    /// Two impulses: at zero, and one split over two ticks.
-    Two([Tap; 3]),
-    /// Three impulses, all but the first split over two ticks.
-    Three([Tap; 5]),
-    /// Four impulses, likewise.
-    Four([Tap; 7]),
-    /// Five impulses, likewise.
-    Five([Tap; 9]),
-    /// A box: its output's change, to be summed up.
-    Box([Tap; 5]),
+/// Taps of a cascade: two modes, each with five impulses and a box, have 28.
+const MAX_TAPS: usize = 28;
+
+/// What a stage does with its taps, and how many they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shape {
+    /// Two impulses, at zero and one split over two ticks: three taps.
+    Two,
+    /// Three impulses, all but the first split over two ticks: five taps.
+    Three,
+    /// Four impulses, likewise: seven taps.
+    Four,
+    /// Five impulses, likewise: nine taps.
+    Five,
+    /// A box: five taps, which give its output's change, to be summed up.
+    Box,
 }
 
 /// One stage in machine units.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct StageTaps {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct StageShape {
     /// Slot of the stage's newest sample.
     pub first_slot: u16,
-    /// The taps.
-    pub taps: Taps,
+    /// What it does with its taps.
+    pub shape: Shape,
 }
 
-impl StageTaps {
-    /// The taps as a list.
-    pub fn list(&self) -> &[Tap] {
-        match &self.taps {
-            Taps::Two(taps) => taps,
-            Taps::Three(taps) | Taps::Box(taps) => taps,
-            Taps::Four(taps) => taps,
-            Taps::Five(taps) => taps,
+/// The mean delay of a stage, exactly that of the rounded weights.
+///
+/// ```text
+/// shaper: Σ w_i d_i        box: Σ n Σ_{d_j ≤ n} c_j = −Σ c_j d_j (d_j − 1) / 2,   as Σ c_j = 0
+/// ```
+fn centroid(shape: Shape, taps: &[Tap]) -> TickTime {
+    let moments = taps.iter().map(|tap| {
+        let (delay, weight) = (i64::from(tap.delay), i64::from(tap.weight));
+        if shape == Shape::Box {
+            -weight * (delay * (delay - 1) / 2)
+        } else {
+            weight * delay
         }
-    }
-
-    /// The mean delay, exactly that of the rounded weights.
-    ///
-    /// ```text
-    /// shaper: Σ w_i d_i        box: Σ n Σ_{d_j ≤ n} c_j = −Σ c_j d_j (d_j − 1) / 2,   as Σ c_j = 0
-    /// ```
-    fn centroid(&self) -> TickTime {
-        let is_box = matches!(self.taps, Taps::Box(_));
-        let moments = self.list().iter().map(|tap| {
-            let (delay, weight) = (i64::from(tap.delay), i64::from(tap.weight));
-            if is_box {
-                -weight * (delay * (delay - 1) / 2)
-            } else {
-                weight * delay
-            }
-        });
-        moments.sum::<i64>() << (32 - WEIGHT_BITS)
-    }
+    });
+    moments.sum::<i64>() << (32 - WEIGHT_BITS)
 }
 
 /// A prefilter's taps for the tick.
@@ -107,7 +97,9 @@ impl StageTaps {
 /// bit for bit.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kernel {
-    pub(super) stages: Vec<StageTaps, MAX_STAGES>,
+    pub(super) stages: Vec<StageShape, MAX_STAGES>,
+    /// Those of all stages, in their order.
+    pub(super) taps: Vec<Tap, MAX_TAPS>,
     length_ticks: u16,
     delay_ticks: u16,
     length: TickTime,
@@ -128,45 +120,56 @@ impl Kernel {
         let too_long = PrefilterError::TooLong {
             length_s: prefilter.length_s() as f32,
         };
-        let mut stages = Vec::new();
-        let mut first_slot: u16 = 0;
-        let mut delays = 0;
+        let mut kernel = Self {
+            stages: Vec::new(),
+            taps: Vec::new(),
+            length_ticks: 0,
+            delay_ticks: 0,
+            length: tick_time(prefilter.length_s()),
+            has_long_box: prefilter.longest_box_s().unwrap_or(0.0) >= LONG_BOX_S,
+            centroid: 0,
+        };
         for stage in prefilter.stages() {
             if stage.length_s() > SLOTS as f64 * TICK_S {
                 return Err(too_long);
             }
-            let tap = |(delay, weight)| Tap {
-                slot: first_slot + delay,
-                delay,
-                weight,
-            };
-            let taps = match stage {
-                Stage::Zv(mode) => Taps::Two(zv_weights(mode).map(tap)),
+            let pushed = match stage {
+                Stage::Zv(mode) => kernel.push(Shape::Two, &zv_weights(mode)),
                 Stage::Impulses(list) => match list.len() {
-                    0..=2 => Taps::Two(impulse_weights(list).map(tap)),
-                    3 => Taps::Three(impulse_weights(list).map(tap)),
-                    4 => Taps::Four(impulse_weights(list).map(tap)),
-                    _ => Taps::Five(impulse_weights(list).map(tap)),
+                    0..=2 => kernel.push(Shape::Two, &impulse_weights::<3>(list)),
+                    3 => kernel.push(Shape::Three, &impulse_weights::<5>(list)),
+                    4 => kernel.push(Shape::Four, &impulse_weights::<7>(list)),
+                    _ => kernel.push(Shape::Five, &impulse_weights::<9>(list)),
                 },
-                Stage::Box(length_s) => Taps::Box(box_changes(*length_s).map(tap)),
+                Stage::Box(length_s) => kernel.push(Shape::Box, &box_changes(*length_s)),
             };
-            let stage = StageTaps { first_slot, taps };
-            let last_delay = stage.list().iter().map(|tap| tap.delay).max().unwrap_or(0);
-            stages.push(stage).map_err(|_| too_long)?;
-            first_slot += last_delay + 1;
-            delays += last_delay;
-            if usize::from(first_slot) > SLOTS {
+            if pushed.is_none() || usize::from(kernel.length_ticks) > SLOTS {
                 return Err(too_long);
             }
         }
-        Ok(Self {
-            centroid: stages.iter().map(StageTaps::centroid).sum(),
-            stages,
-            length_ticks: first_slot,
-            delay_ticks: delays,
-            length: tick_time(prefilter.length_s()),
-            has_long_box: prefilter.longest_box_s().unwrap_or(0.0) >= LONG_BOX_S,
-        })
+        Ok(kernel)
+    }
+
+    /// Adds a stage; none if there is no room for it.
+    fn push(&mut self, shape: Shape, weights: &[(u16, i32)]) -> Option<()> {
+        let first_slot = self.length_ticks;
+        let place = self.taps.len();
+        for &(delay, weight) in weights {
+            let slot = first_slot + delay;
+            self.taps
+                .push(Tap {
+                    slot,
+                    delay,
+                    weight,
+                })
+                .ok()?;
+        }
+        self.stages.push(StageShape { first_slot, shape }).ok()?;
+        let last_delay = weights.iter().map(|(delay, _)| *delay).max().unwrap_or(0);
+        self.length_ticks += last_delay + 1;
+        self.delay_ticks += last_delay;
+        self.centroid += centroid(shape, self.taps.get(place..)?);
+        Some(())
     }
 
     /// `T_h`.
@@ -300,18 +303,35 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec as StdVec;
 
+    impl Kernel {
+        /// Each stage with its taps.
+        fn with_taps(&self) -> impl Iterator<Item = (Shape, &[Tap])> {
+            let mut left = self.taps.as_slice();
+            self.stages.iter().map(move |stage| {
+                let (own, others) = left.split_at(match stage.shape {
+                    Shape::Two => 3,
+                    Shape::Three | Shape::Box => 5,
+                    Shape::Four => 7,
+                    Shape::Five => 9,
+                });
+                left = others;
+                (stage.shape, own)
+            })
+        }
+    }
+
     /// The impulse response of a kernel, one value a tick, with its rounded weights in f64.
     fn impulse_response(kernel: &Kernel) -> StdVec<f64> {
         let mut response = std::vec![1.0];
-        for stage in &kernel.stages {
-            let last = stage.list().iter().map(|tap| tap.delay).max().unwrap();
+        for (shape, taps) in kernel.with_taps() {
+            let last = taps.iter().map(|tap| tap.delay).max().unwrap();
             let mut next = std::vec![0.0; response.len() + usize::from(last)];
             for (i, value) in response.iter().enumerate() {
-                for tap in stage.list() {
+                for tap in taps {
                     next[i + usize::from(tap.delay)] += value * f64::from(tap.weight) / ONE;
                 }
             }
-            if matches!(stage.taps, Taps::Box(_)) {
+            if shape == Shape::Box {
                 let mut sum = 0.0;
                 for value in &mut next {
                     sum += *value;
@@ -351,21 +371,20 @@ mod tests {
             kind in 0..Kind::ALL.len(), frequency in 3.2_f32..60.0, damping in 0.0_f32..0.3
         ) {
             let kernel = Kernel::new(&prefilter(Kind::ALL[kind], frequency, damping)).unwrap();
-            for stage in &kernel.stages {
-                if matches!(stage.taps, Taps::Box(_)) {
-                    let changes: i64 = stage.list().iter().map(|tap| i64::from(tap.weight)).sum();
+            for (shape, taps) in kernel.with_taps() {
+                if shape == Shape::Box {
+                    let changes: i64 = taps.iter().map(|tap| i64::from(tap.weight)).sum();
                     // the sum of the weights, from their changes
-                    let area: i64 = stage
-                        .list()
+                    let area: i64 = taps
                         .iter()
                         .map(|tap| -i64::from(tap.delay) * i64::from(tap.weight))
                         .sum();
                     prop_assert_eq!(changes, 0);
                     prop_assert_eq!(area, 1 << WEIGHT_BITS);
                 } else {
-                    let sum: i64 = stage.list().iter().map(|tap| i64::from(tap.weight)).sum();
+                    let sum: i64 = taps.iter().map(|tap| i64::from(tap.weight)).sum();
                     prop_assert_eq!(sum, 1 << WEIGHT_BITS);
-                    prop_assert!(stage.list().iter().all(|tap| tap.weight >= 0));
+                    prop_assert!(taps.iter().all(|tap| tap.weight >= 0));
                 }
             }
         }
