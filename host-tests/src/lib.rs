@@ -7,6 +7,7 @@
 //! | setpoints | [`trace`]: the [`plant`] | the tool's motion |
 //! | trace | [`checker`], [`vibration`] | [`scenario`]'s outcome: [`summary`], [`pictures`] |
 
+pub mod any_program;
 pub mod bridge;
 pub mod checker;
 pub mod commands;

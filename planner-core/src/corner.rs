@@ -21,7 +21,7 @@ const CORNERING_WIDTH_S: f32 = 4e-6;
 const CROSSING_WIDTH: f32 = 1e-3;
 
 /// Samples of the deviation on either side of the crossing, beside an arc.
-const SAMPLES: usize = 2;
+const SAMPLES: usize = 3;
 
 /// What the samples of the deviation are multiplied with, for what lies between them.
 const SAMPLING: f32 = 1.25;

@@ -1,17 +1,19 @@
 //! The schedule: when each segment of the raw path begins.
 //!
 //! A segment starts `t_d` after the one before has begun to decelerate; the corner solver
-//! gives `t_d` from the corner's tolerance. Corners that follow each other closely share the
-//! tolerance (see [`Schedule::plan`]), so that it holds on segments of any length.
-
-use heapless::Deque;
+//! gives `t_d` from the corner's tolerance. Where several corners lie within the prefilter's
+//! length the path goes slower or stands longer, so that the tolerance holds on segments of any
+//! length: see [`crate::dense`].
 
 use crate::config::Robot;
-use crate::corner::{self, Corner, CornerRule, Side, reach_s};
+use crate::corner::{self, Corner, CornerRule, Side};
+use crate::dense::{Chain, Step, Walk};
 use crate::hop::Hop;
 use crate::kinematics::Elbow;
 use crate::limits::{Bound, Choice, Course, Limited, Run};
 use crate::math::sqrt_f32;
+use crate::outline::Joint;
+use crate::passage::{self, Asked};
 use crate::path::PathSegment;
 use crate::pose::{JointPosition, Pose};
 use crate::prefilter::{Kernel, Response};
@@ -19,10 +21,6 @@ use crate::queue::{Action, RawItem, SegmentProducer};
 use crate::rate::Rate;
 use crate::raw::{LONGEST_S, ONE_TICK, Pace, RawSegment, TickTime, tick_time};
 use crate::units::TICK_S;
-
-/// Corners that can still be rounding when another one begins. With more, the next segment
-/// waits for the oldest: slower, never wrong.
-const BLENDING_CORNERS: usize = 64;
 
 /// What the fixed-point trace can miss a point by, in mm: ten times its resolution.
 const RESOLUTION_MM: f32 = 2e-5;
@@ -32,21 +30,6 @@ const SHORTEST_HURRIED: TickTime = 2 * ONE_TICK;
 
 /// One control tick in seconds.
 const TICK: f32 = TICK_S as f32;
-
-/// A corner that is being rounded until the deceleration of its first segment ends.
-#[derive(Clone, Copy, Debug)]
-struct Blend {
-    /// Counted from the end of the raw path planned so far.
-    ends: TickTime,
-    /// `|u₂ − u₁|`, the change of the tangent; infinite beside an arc.
-    turn: f32,
-    /// How far the command strays along either tangent, for each mm/s of feedrate.
-    reach_s: f32,
-    /// The faster of its two segments.
-    feed_mm_s: f32,
-    /// Infinite where the overlap is given instead.
-    tolerance_mm: f32,
-}
 
 /// How long a segment takes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -77,12 +60,38 @@ pub struct Schedule<'q> {
     queue: SegmentProducer<'q>,
     /// The segment that the next one makes a corner with; none where the path must stop.
     previous: Option<Side>,
-    /// The corners that are still being rounded, oldest first.
-    blends: Deque<Blend, BLENDING_CORNERS>,
+    /// How long the corners so far are still being rounded, from the end of the raw path.
+    busy: TickTime,
+    /// What the last of them is.
+    last: Kind,
+    /// The lines that lead to the end of the raw path.
+    chain: Chain,
     /// What the limits have to know of the path so far.
     run: Run,
     /// What limits the last segment planned.
     limited: Option<Limited>,
+}
+
+/// Corners of which only those of the same kind are rounded at once, and those at arcs never.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    /// Between lines, within a tolerance.
+    Tolerance,
+    /// Between lines, with a given overlap: nothing is promised.
+    Overlap,
+    /// At an arc.
+    Arc,
+}
+
+/// How a corner is passed.
+#[derive(Clone, Copy, Debug)]
+struct Passage {
+    /// How long the raw path stands there; an exact stop if no less than the prefilter's length.
+    dwell: TickTime,
+    /// How long the segment behind it lasts, if longer than asked for.
+    longer_s: Option<f32>,
+    /// How it joins the lines before, with what tolerance; nothing where it need not be known.
+    joint: Option<(Joint, Step)>,
 }
 
 impl<'q> Schedule<'q> {
@@ -91,7 +100,9 @@ impl<'q> Schedule<'q> {
         Self {
             queue,
             previous: None,
-            blends: Deque::new(),
+            busy: 0,
+            last: Kind::Tolerance,
+            chain: Chain::default(),
             run: Run::default(),
             limited: None,
         }
@@ -110,26 +121,20 @@ impl<'q> Schedule<'q> {
     /// Forgets what came before: the next segment begins from rest.
     pub fn reset(&mut self) {
         self.previous = None;
-        self.blends.clear();
+        self.busy = 0;
+        self.last = Kind::Tolerance;
+        self.chain = Chain::default();
         self.run = Run::default();
     }
 
     /// Plans a segment that follows the last one, with a rule for the corner between the two.
     ///
     /// The tolerance holds for segments of any length. A corner that is rounded alone misses
-    /// by its `e_c`. Where several are being rounded at once, the command is a weighted mean
-    /// of raw points on a polyline, and against the tangent at the mean each corner bends it
-    /// by at most its change of tangent times the mean distance that the raw point is past
-    /// the corner, or has yet to go, whichever is less:
-    ///
-    /// ```text
-    /// |P − path| ≤ F Σ |u₂ − u₁|_j r_j,     r_j = I(x) = I₋(t_c − x) for the corner's t_c
-    /// ```
-    ///
-    /// with `F` the fastest of the segments. A segment begins only when that sum, its own
-    /// corner included, is within the smallest tolerance of the corners being rounded, or
-    /// when they are done. Corners at arcs are always rounded alone. Corners whose overlap is
-    /// given promise nothing: they are rounded as given, any number of them at once, but never
+    /// by its `e_c`. Where several are being rounded at once the command is nowhere further from
+    /// the path than the smallest of their tolerances, as [`crate::dense`] says; the segment
+    /// lasts longer than asked for, or the path stands longer at the corner, whichever takes
+    /// less time. Corners at arcs are always rounded alone. Corners whose overlap is given
+    /// promise nothing: they are rounded as given, any number of them at once, but never
     /// together with one that has a tolerance.
     ///
     /// On the way of the segment the prefilter may change to another one; what follows has to be
@@ -145,6 +150,9 @@ impl<'q> Schedule<'q> {
         line: u32,
         on_the_way: Option<&Kernel>,
     ) -> bool {
+        if self.free_places() == 0 {
+            return false;
+        }
         let limits = &robot.limits;
         let limited = limits.is_set().then(|| {
             let course = Course::new(path);
@@ -169,35 +177,38 @@ impl<'q> Schedule<'q> {
             });
         }
         let length_mm = path.length_mm() as f32;
-        let duration_s = timing.duration_s.clamp(TICK_S, LONGEST_S);
+        let asked_s = timing.duration_s.clamp(TICK_S, LONGEST_S);
         let (first_tangent, last_tangent, heading_rate_per_mm) = path.tangents();
-        let side = |tangent| Side {
+        let side = |tangent, duration_s: f64| Side {
             feed_mm_s: length_mm / duration_s as f32,
             tangent,
             heading_rate_per_mm,
             length_mm,
         };
-        if self.free_places() == 0 {
-            return false;
-        }
-        let overlap = match self.previous {
-            None => 0,
+        let settled = robot.kernel.length();
+        let passage = match self.previous {
+            None => Passage::of(settled),
             Some(arriving) => {
-                let leaving = side(first_tangent);
-                let overlap = self.corner(robot, &arriving, &leaving, rule);
-                overlap.min(robot.kernel.length() - stop)
+                let leaving = side(first_tangent, asked_s);
+                self.corner(robot, &arriving, &leaving, rule, stop)
             }
         };
-        self.previous = Some(side(last_tangent));
+        let duration_s = passage.longer_s.map_or(asked_s, |longer_s| {
+            f64::from(longer_s).clamp(asked_s, LONGEST_S)
+        });
+        self.note(robot, &passage, duration_s as f32);
+        self.previous = Some(side(last_tangent, duration_s));
         let segment = RawSegment {
-            overlap,
+            overlap: (settled - passage.dwell).max(0),
             pace: timing.pace,
             line,
             ..RawSegment::new(path, duration_s)
         };
-        let passed = robot.kernel.length() - overlap + segment.duration;
-        for blend in &mut self.blends {
-            blend.ends -= passed;
+        let passed = passage.dwell.min(settled) + segment.duration;
+        self.busy -= passed;
+        if on_the_way.is_some() {
+            // the filter of what comes has seen this line only
+            self.chain = Chain::default();
         }
         // A segment may be hurried if the corner before it is done at its end.
         let is_done = passed >= robot.kernel.settling_time();
@@ -207,8 +218,7 @@ impl<'q> Schedule<'q> {
             Rate::ONE
         };
         if let Some((course, choice)) = &limited {
-            let seconds = |time: TickTime| time as f32 / ONE_TICK as f32 * TICK;
-            let dwell_s = seconds(robot.kernel.length() - overlap);
+            let dwell_s = seconds(passage.dwell.min(settled));
             let shortest_s = seconds(top_rate.real(segment.duration.min(ONE_TICK << 13)));
             self.run.take(limits, course, choice, dwell_s, shortest_s);
         }
@@ -317,83 +327,184 @@ impl<'q> Schedule<'q> {
         queued
     }
 
-    /// How long a segment begins before the one before has come to a stop; 0 is an exact stop.
+    /// How a corner is passed, where the raw path stands for `stop` at least.
     fn corner(
         &mut self,
         robot: &Robot,
         arriving: &Side,
         leaving: &Side,
         rule: CornerRule,
-    ) -> TickTime {
+        stop: TickTime,
+    ) -> Passage {
         let settled = robot.kernel.length();
-        let (cornering_s, tolerance_mm) = match rule {
-            CornerRule::ToleranceMm(tolerance_mm) => {
-                let turns_only = arriving.feed_mm_s == 0.0 || leaving.feed_mm_s == 0.0;
-                let usable_mm = if turns_only { 0.0 } else { tolerance_mm };
-                let corner = solve_sampled(robot, arriving, leaving, usable_mm);
-                (corner.cornering_s, usable_mm)
-            }
-            CornerRule::OverlapPercent(percent) => {
-                let share = sqrt_f32((percent / 100.0).clamp(0.0, 1.0));
-                (robot.decelerating.length_s() * share, f32::INFINITY)
-            }
+        let (kind, alone, usable_mm) = alone(robot, arriving, leaving, rule);
+        let (busy, last) = (self.busy, self.last);
+        self.last = kind;
+        // an arc keeps its filter until that has settled to the last bit
+        self.busy = if kind == Kind::Arc {
+            robot.kernel.settling_time()
+        } else {
+            settled
         };
-        let mut dwell = settled - tick_time(f64::from(cornering_s)).min(settled);
-        let turn = turn(arriving, leaving);
-        let own = Blend {
-            // an arc keeps its filter until that has settled to the last bit
-            ends: if turn.is_finite() {
-                settled
+        let may_join = kind == last && kind != Kind::Arc;
+        let least = stop.max(if may_join { 0 } else { busy });
+        let dwell = alone.max(least);
+        if kind != Kind::Tolerance || dwell >= settled {
+            return Passage::of(dwell);
+        }
+        let duration_s = leaving.length_mm / leaving.feed_mm_s;
+        if self.chain.is_empty() {
+            let arriving_s = arriving.length_mm / arriving.feed_mm_s;
+            self.chain
+                .begin(robot, arriving.tangent, arriving.length_mm, arriving_s);
+        }
+        let step = dense_step(robot, arriving, leaving, usable_mm);
+        let steady_s = passage::steady_s(&self.chain, robot, &step, turn(arriving, leaving));
+        // a stop, and then the feedrate asked for, takes no longer
+        let slowest_s = duration_s + robot.accelerating.length_s();
+        let steady_s = steady_s.min(slowest_s).max(duration_s);
+        let joint = self.chain.joint(robot, &step, steady_s);
+        let is_alone = dwell >= busy && dwell + tick_time(f64::from(duration_s)) >= settled;
+        let asked = Asked {
+            least_dwell_s: seconds(least),
+            dwell_s: seconds(dwell),
+            duration_s,
+            steady_s,
+        };
+        let walk = if is_alone {
+            Walk {
+                dwell_s: asked.dwell_s,
+                duration_s,
+            }
+        } else {
+            passage::choose(&self.chain, robot, &joint, &step, &asked)
+        };
+        Passage {
+            dwell: if walk.dwell_s == asked.dwell_s {
+                dwell
+            } else if walk.dwell_s == asked.least_dwell_s {
+                least
             } else {
-                robot.kernel.settling_time()
+                tick_time(f64::from(walk.dwell_s))
             },
-            turn,
-            reach_s: reach_s(&robot.decelerating, &robot.accelerating, cornering_s),
-            feed_mm_s: arriving.feed_mm_s.max(leaving.feed_mm_s),
-            tolerance_mm,
-        };
-        while let Some(oldest) = self.blends.front().copied() {
-            if oldest.ends > dwell && self.may_join(&own) && !self.blends.is_full() {
-                break;
-            }
-            dwell = dwell.max(oldest.ends);
-            self.blends.pop_front();
+            longer_s: (walk.duration_s > duration_s).then_some(walk.duration_s),
+            joint: Some((joint, step)),
         }
-        if dwell < settled {
-            // there is room: a full deque has given up its oldest
-            let _ = self.blends.push_back(own);
-        }
-        (settled - dwell).max(0)
     }
 
-    /// Whether a further corner may be rounded together with those that are: between lines only,
-    /// and where all overlaps are given, or all together keep the smallest tolerance.
-    fn may_join(&self, own: &Blend) -> bool {
-        let all = || self.blends.iter().chain(core::iter::once(own));
-        if all().any(|blend| blend.turn.is_infinite()) {
-            return false;
+    /// Notes a segment with which the path goes on. A run that ends here begins anew at the
+    /// next corner.
+    fn note(&mut self, robot: &Robot, passage: &Passage, duration_s: f32) {
+        let is_stop = passage.dwell >= robot.kernel.length();
+        if is_stop {
+            self.busy = 0;
         }
-        let given = |blend: &Blend| blend.tolerance_mm.is_infinite();
-        if all().any(given) {
-            return all().all(given);
+        match &passage.joint {
+            Some((joint, step)) if !is_stop => {
+                let walk = Walk {
+                    dwell_s: seconds(passage.dwell),
+                    duration_s,
+                };
+                self.chain.push(robot, joint, step, &walk);
+            }
+            _ => self.chain.end(),
         }
-        let mut bend_s = 0.0;
-        let mut feed_mm_s = 0.0_f32;
-        let mut limit_mm = f32::INFINITY;
-        for blend in all() {
-            bend_s += blend.turn * blend.reach_s;
-            feed_mm_s = feed_mm_s.max(blend.feed_mm_s);
-            limit_mm = limit_mm.min(blend.tolerance_mm);
-        }
-        feed_mm_s * bend_s <= limit_mm
     }
 }
 
-/// `|u₂ − u₁|`, the change of the tangent at a corner between lines; infinite at an arc.
-fn turn(arriving: &Side, leaving: &Side) -> f32 {
-    if arriving.heading_rate_per_mm != 0.0 || leaving.heading_rate_per_mm != 0.0 {
-        return f32::INFINITY;
+impl Passage {
+    /// After standing for so long, as asked for.
+    fn of(dwell: TickTime) -> Self {
+        Self {
+            dwell,
+            longer_s: None,
+            joint: None,
+        }
     }
+}
+
+/// A time in seconds.
+fn seconds(time: TickTime) -> f32 {
+    time as f32 * (TICK / ONE_TICK as f32)
+}
+
+/// The kind of a corner, how long the raw path stands there if it is rounded alone, and its
+/// tolerance.
+fn alone(
+    robot: &Robot,
+    arriving: &Side,
+    leaving: &Side,
+    rule: CornerRule,
+) -> (Kind, TickTime, f32) {
+    let at_arc = arriving.heading_rate_per_mm != 0.0 || leaving.heading_rate_per_mm != 0.0;
+    let kind = |between_lines| if at_arc { Kind::Arc } else { between_lines };
+    match rule {
+        CornerRule::ToleranceMm(tolerance_mm) => {
+            let turns_only = arriving.feed_mm_s == 0.0 || leaving.feed_mm_s == 0.0;
+            let usable_mm = if turns_only { 0.0 } else { tolerance_mm };
+            let dwell = dwell_alone(robot, arriving, leaving, usable_mm, at_arc);
+            (kind(Kind::Tolerance), dwell, usable_mm)
+        }
+        CornerRule::OverlapPercent(percent) => {
+            let share = sqrt_f32((percent / 100.0).clamp(0.0, 1.0));
+            let cornering_s = robot.decelerating.length_s() * share;
+            let settled = robot.kernel.length();
+            let dwell = settled - tick_time(f64::from(cornering_s)).min(settled);
+            (kind(Kind::Overlap), dwell, f32::INFINITY)
+        }
+    }
+}
+
+/// A line that follows another one, with what sampling in ticks leaves of the tolerance.
+///
+/// An input between two ticks, and an impulse split over two, spread the prefilter by up to
+/// half a tick: a part of its length. Where the velocity jumps, straight lines between ticks
+/// miss a corner by `Δv T_s / 4`.
+fn dense_step(robot: &Robot, arriving: &Side, leaving: &Side, tolerance_mm: f32) -> Step {
+    let spread = 2.0 * TICK / robot.accelerating.length_s().max(2.0 * TICK);
+    let jump_mm = if robot.prefilter.longest_box_s().is_none() {
+        let feed_mm_s = arriving.feed_mm_s.max(leaving.feed_mm_s);
+        turn(arriving, leaving) * feed_mm_s * TICK / 4.0
+    } else {
+        0.0
+    };
+    Step {
+        tangent: leaving.tangent,
+        length_mm: leaving.length_mm,
+        tolerance_mm: (1.0 - spread) * tolerance_mm - jump_mm - RESOLUTION_MM,
+    }
+}
+
+/// How long the raw path stands at a corner that is rounded alone.
+fn dwell_alone(
+    robot: &Robot,
+    arriving: &Side,
+    leaving: &Side,
+    tolerance_mm: f32,
+    at_arc: bool,
+) -> TickTime {
+    let settled = robot.kernel.length();
+    if !at_arc && is_slight(robot, arriving, leaving, tolerance_mm) {
+        return 0;
+    }
+    let corner = solve_sampled(robot, arriving, leaving, tolerance_mm);
+    if corner.cornering_s >= corner.deceleration_s {
+        return 0;
+    }
+    settled - tick_time(f64::from(corner.cornering_s)).min(settled)
+}
+
+/// Whether a corner between lines keeps its tolerance without a dwell, plainly:
+/// `F |Δu| I(m)` is within it.
+fn is_slight(robot: &Robot, arriving: &Side, leaving: &Side, tolerance_mm: f32) -> bool {
+    let feed_mm_s = arriving.feed_mm_s.max(leaving.feed_mm_s);
+    let (_, reach_s) = robot.accelerating.at(robot.accelerating.delay_s());
+    let miss_mm = feed_mm_s * turn(arriving, leaving) * (reach_s + TICK / 2.0);
+    miss_mm <= tolerance_mm - RESOLUTION_MM
+}
+
+/// `|u₂ − u₁|`, the change of the tangent at a corner.
+fn turn(arriving: &Side, leaving: &Side) -> f32 {
     let pairs = arriving.tangent.iter().zip(leaving.tangent);
     let squared: f32 = pairs.map(|(u1, u2)| (u2 - u1) * (u2 - u1)).sum();
     sqrt_f32(squared)
@@ -433,5 +544,91 @@ fn solve_sampled(robot: &Robot, arriving: &Side, leaving: &Side, tolerance_mm: f
         solve(margin_mm(change_mm_s))
     } else {
         corner
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::RobotConfig;
+    use crate::path::Shape;
+    use crate::queue::SegmentQueue;
+    use std::vec::Vec;
+
+    /// `(dwell, duration)` in seconds of each line of a polyline.
+    fn planned(robot: &Robot, points: &[[f64; 2]], feed_mm_s: f64) -> Vec<(f64, f64)> {
+        let mut queue = SegmentQueue::new();
+        let (producer, mut consumer) = queue.split();
+        let mut schedule = Schedule::new(producer);
+        let mut all = Vec::new();
+        let pose = |[x, y]: [f64; 2]| Pose {
+            x: fixed::types::I13F19::from_num(x),
+            y: fixed::types::I13F19::from_num(y),
+            ..Pose::default()
+        };
+        for pair in points.windows(2) {
+            let path = PathSegment {
+                start: pose(pair[0]),
+                target: pose(pair[1]),
+                shape: Shape::Line,
+            };
+            let duration_s = path.length_mm() / feed_mm_s;
+            let timing = Timing {
+                duration_s,
+                shortest_s: duration_s,
+                pace: Pace::Feed,
+                ..Timing::default()
+            };
+            let rule = CornerRule::ToleranceMm(robot.config.corner_tolerance_mm);
+            assert!(schedule.plan(robot, &path, &timing, rule, 0, None));
+            if let Some(RawItem::Segment(segment)) = consumer.pop() {
+                let seconds = |time: TickTime| time as f64 / ONE_TICK as f64 * TICK_S;
+                all.push((
+                    seconds(robot.kernel.length() - segment.overlap),
+                    seconds(segment.duration),
+                ));
+            }
+        }
+        all
+    }
+
+    fn robot(settings: &str) -> Robot {
+        let mut config = RobotConfig::default();
+        config.set_all(settings).unwrap();
+        Robot::new(&config).unwrap()
+    }
+
+    #[test]
+    fn a_circle_of_chords_is_walked_steadily() {
+        let robot = robot("tolerance=0.1 prefilter=fir-zvd");
+        let count = 785;
+        let points: Vec<_> = (0..=count)
+            .map(|i| {
+                let angle = core::f64::consts::TAU * f64::from(i) / f64::from(count);
+                [25.0 * angle.cos(), 25.0 * angle.sin()]
+            })
+            .collect();
+        let bound_mm_s = f64::from(sqrt_f32(2.0 * 25.0 * 0.1) / robot.accelerating.spread_s());
+        let lines = planned(&robot, &points, 160.0);
+        for (i, (dwell_s, duration_s)) in lines.into_iter().enumerate().skip(1) {
+            assert_eq!(dwell_s, 0.0);
+            let part = 0.2 / duration_s / bound_mm_s;
+            // the first line is walked at the feedrate asked for, which the filter remembers
+            let least = if i < 100 { 0.85 } else { 0.95 };
+            assert!(
+                (least..1.0).contains(&part),
+                "line {i}: {part} of the bound"
+            );
+        }
+    }
+
+    #[test]
+    fn a_straight_line_in_pieces_is_walked_at_the_feedrate_asked_for() {
+        let robot = robot("tolerance=0.01");
+        let points: Vec<_> = (0..=200).map(|i| [f64::from(i) * 0.5, 0.0]).collect();
+        for (dwell_s, duration_s) in planned(&robot, &points, 160.0).into_iter().skip(1) {
+            assert_eq!(dwell_s, 0.0);
+            assert!((0.5 / duration_s - 160.0).abs() < 0.01);
+        }
     }
 }

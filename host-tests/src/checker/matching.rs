@@ -45,12 +45,13 @@ pub fn match_in_order(points: &[[f64; 3]], polyline: &[[f64; 3]]) -> Match {
         .fold(0.0, f64::max);
     let mut best = vec![(0, 0.0); points.len()];
     let mut low = 0.0;
-    if let Some(places) = places_within(points, polyline, RESOLUTION_MM) {
+    let places_within = |reach_mm| places_within(points, polyline, |_, _| reach_mm);
+    if let Some(places) = places_within(RESOLUTION_MM) {
         (high, best) = (RESOLUTION_MM.min(high), places);
     }
     while high - low > RESOLUTION_MM {
         let middle = f64::midpoint(low, high);
-        match places_within(points, polyline, middle) {
+        match places_within(middle) {
             Some(places) => (high, best) = (middle, places),
             None => low = middle,
         }
@@ -61,13 +62,34 @@ pub fn match_in_order(points: &[[f64; 3]], polyline: &[[f64; 3]]) -> Match {
     }
 }
 
-/// The earliest places within `reach_mm`, or `None` where a point has none.
-fn places_within(points: &[[f64; 3]], polyline: &[[f64; 3]], reach_mm: f64) -> Option<Vec<Place>> {
+/// Whether every point has a place within reach, none before the place of the point before. How
+/// far that is `reach_mm` says, of the numbers of a point and of a chord.
+#[must_use]
+pub fn are_in_order(
+    points: &[[f64; 3]],
+    polyline: &[[f64; 3]],
+    reach_mm: impl Fn(usize, usize) -> f64,
+) -> bool {
+    let finite = |list: &[[f64; 3]]| list.iter().flatten().all(|x| x.is_finite());
+    finite(points)
+        && finite(polyline)
+        && !polyline.is_empty()
+        && places_within(points, polyline, reach_mm).is_some()
+}
+
+/// The earliest places within reach, or `None` where a point has none.
+fn places_within(
+    points: &[[f64; 3]],
+    polyline: &[[f64; 3]],
+    reach_mm: impl Fn(usize, usize) -> f64,
+) -> Option<Vec<Place>> {
     let mut place = (0, 0.0);
     points
         .iter()
-        .map(|&point| {
+        .enumerate()
+        .map(|(i, &point)| {
             loop {
+                let reach_mm = reach_mm(i, place.0);
                 let a = polyline[place.0];
                 let b = polyline.get(place.0 + 1).copied().unwrap_or(a);
                 if let Some(share) = earliest(point, a, b, place.1, reach_mm) {

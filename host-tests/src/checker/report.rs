@@ -142,16 +142,16 @@ impl Report {
 }
 
 /// The program's path as a polyline.
-struct Outline {
-    points: Vec<[f64; 3]>,
+pub(super) struct Outline {
+    pub(super) points: Vec<[f64; 3]>,
     /// Path length at each point.
     lengths: Vec<f64>,
     /// For each block that translates: its number and the points of its two ends.
-    ends: Vec<(usize, usize, usize)>,
+    pub(super) ends: Vec<(usize, usize, usize)>,
 }
 
 impl Outline {
-    fn new(program: &Program) -> Self {
+    pub(super) fn new(program: &Program) -> Self {
         let mut points = vec![xyz(program.start)];
         let mut lengths = vec![0.0];
         let mut ends = Vec::new();
