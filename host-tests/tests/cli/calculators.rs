@@ -325,7 +325,7 @@ fn a_deltas_joints_are_four_angles() {
     for (place, sentence) in [
         (
             ["0", "0", "-1200", "0"],
-            "1210.000 mm from the shoulder of arm 1",
+            "1209.969 mm from the shoulder of arm 1",
         ),
         (
             ["0", "0", "-1130", "0"],
