@@ -12,10 +12,12 @@ use firmware::board::{self, Console, Counter, Stopwatch};
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::corner::{self, CornerRule, Side};
 use planner_core::gcode::{Defaults, Interpreter, Line};
+use planner_core::kinematics::ArmKind;
 use planner_core::motion::{DelayLines, Motion, MotionState, Order};
 use planner_core::orientation::Orientation;
 use planner_core::overlap::{Method, Move, Segment, SpeedCurve, ToolPose, ToolState, plan};
 use planner_core::planner::Planner;
+use planner_core::pose::{JointState, Pose};
 use planner_core::prefilter::{Kind, PrefilterConfig};
 use planner_core::protocol::{Controller, Identity, Report, Settings, Step};
 use planner_core::queue::SegmentQueue;
@@ -85,6 +87,24 @@ fn main() -> ! {
             bench.print(format_args!("tick/{program}/at-{percent}"), cost.tick);
         }
     }
+    let delta = delta(Kind::FirZvd, 6.34);
+    let worst = bench.run(&delta, DELTA_PROGRAM, filters, 100);
+    bench.print(format_args!("tick/delta"), worst.tick);
+    bench.print(format_args!("line/delta"), worst.line);
+    let worst = bench.run(&delta, DELTA_ARCS, filters, 100);
+    bench.print(format_args!("tick/delta-arcs"), worst.tick);
+    for (name, robot, pose) in [
+        (
+            "scara",
+            &robot(Kind::FirZvd, 6.34),
+            [250 << 19, 50 << 19, 0, 0],
+        ),
+        ("delta", &delta, [150 << 19, -70 << 19, -717 << 19, 0]),
+    ] {
+        let worst = bench.arm(robot, Pose::from_bits(pose));
+        bench.print(format_args!("joint-state/{name}"), worst.joint_state);
+        bench.print(format_args!("forward/{name}"), worst.forward);
+    }
     let (_, half_millimetres) = PROGRAMS[2];
     let served = bench.serve(&robot(Kind::FirZvd, 6.34), half_millimetres, filters);
     bench.print(format_args!("link/line"), served.line_mean);
@@ -98,7 +118,16 @@ fn main() -> ! {
 }
 
 fn robot(kind: Kind, frequency_hz: f32) -> Robot {
+    robot_of(ArmKind::Scara, kind, frequency_hz)
+}
+
+fn delta(kind: Kind, frequency_hz: f32) -> Robot {
+    robot_of(ArmKind::Delta, kind, frequency_hz)
+}
+
+fn robot_of(arm: ArmKind, kind: Kind, frequency_hz: f32) -> Robot {
     let config = RobotConfig {
+        arm,
         prefilter: PrefilterConfig {
             kind,
             frequency_hz,
@@ -108,6 +137,19 @@ fn robot(kind: Kind, frequency_hz: f32) -> Robot {
         ..RobotConfig::default()
     };
     defmt::unwrap!(Robot::new(&config).ok(), "the settings are within range")
+}
+
+/// A pick and place of a delta.
+const DELTA_PROGRAM: &str = include_str!("../../../host-tests/programs/delta-pick-and-place.gcode");
+
+/// Arcs of a delta, two in flight all the time.
+const DELTA_ARCS: &str = "G0 X0 Y0 Z-767\nF9600 G64 P0.5\nG2 X40 Y0 R22\nG3 X80 Y0 R22 Z-750\n\
+    G2 X40 Y0 R22\nG3 X0 Y0 R22 Z-767\nM2\n";
+
+/// What the kinematics of a pose cost, in instructions.
+struct ArmCost {
+    joint_state: u32,
+    forward: u32,
 }
 
 /// What a program costs, in instructions.
@@ -199,6 +241,22 @@ impl Bench {
                 all.line_mean = total / count;
                 return all;
             }
+        }
+    }
+
+    /// The kinematics at a pose.
+    fn arm(&self, robot: &Robot, pose: Pose) -> ArmCost {
+        let arm = black_box(&robot.arm);
+        let (velocity, acceleration) = ([100.0, -200.0, 50.0, 10.0], [1e3, 2e3, -3e3, 50.0]);
+        let mut state = JointState::default();
+        let joint_state = self.count(|| {
+            state = arm.joint_state(black_box(&pose), black_box(velocity), acceleration);
+        });
+        let joints = black_box(state.position);
+        let forward = self.count(|| black_box(arm.forward(&joints)));
+        ArmCost {
+            joint_state,
+            forward,
         }
     }
 

@@ -109,9 +109,9 @@ impl Default for FullConfig {
 
 impl FullConfig {
     /// A delta robot. With its motors held and its arms 20° down it resonates first at 36.6 Hz,
-    /// as [vNoorden21] has measured. The thesis gives the drives' limits at the motor and no
-    /// gear: here they are that of the SCARA's shoulder, some three times what its fastest moves
-    /// need.
+    /// as [vNoorden21] has measured. The thesis gives the drives at the motor and no gear: here
+    /// the motor's inertia behind it equals the load's, and the torque limit is some three times
+    /// what the thesis's fastest moves need.
     #[must_use]
     pub fn delta(delta: DeltaArm) -> Self {
         let posture = [20_f64.to_radians(); JOINTS];
@@ -119,7 +119,7 @@ impl FullConfig {
         // Alike arms: the platform goes up and down, or to either side.
         let heaviest = (own + 2.0 * shared).max(own - shared);
         let stiffness = (std::f64::consts::TAU * FIRST_MODE_HZ).powi(2) * heaviest;
-        let arm = joint(Travel::Rotary, 0.5 * own, own, stiffness, 150.0);
+        let arm = joint(Travel::Rotary, heaviest, own, stiffness, 300.0);
         Self {
             body: Body::Delta(delta),
             joints: [

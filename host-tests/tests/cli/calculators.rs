@@ -297,3 +297,51 @@ fn overlap_times_a_path_of_a_tool_that_moves_and_turns() {
     let text = String::from_utf8(text.stdout).unwrap();
     assert!(text.contains("cycle time               5.456 s"), "{text}");
 }
+
+#[test]
+fn a_deltas_joints_are_four_angles() {
+    let robot = programs().join("../robots/delta-800.toml");
+    let robot = robot.to_str().unwrap();
+    let joints = json(&[
+        "inverse", "-350", "0", "-767", "30", "--robot", robot, "--json",
+    ]);
+    assert_eq!(keys(&joints), ["joint1", "joint2", "joint3", "joint4"]);
+    for (key, published) in [
+        ("joint1", 34.782_244),
+        ("joint2", 60.738_544),
+        ("joint3", 2.036_028),
+        ("joint4", 30.0),
+    ] {
+        near(&joints, key, published, 2e-6);
+    }
+    let texts = ["joint1", "joint2", "joint3", "joint4"].map(|key| joints[key].to_string());
+    let mut args = vec!["forward", "--robot", robot, "--json"];
+    args.extend(texts.iter().map(String::as_str));
+    let pose = json(&args);
+    near(&pose, "x_mm", -350.0, 1e-3);
+    near(&pose, "y_mm", 0.0, 1e-3);
+    near(&pose, "z_mm", -767.0, 1e-3);
+    near(&pose, "c_deg", 30.0, 1e-5);
+    for (place, sentence) in [
+        (
+            ["0", "0", "-1200", "0"],
+            "1209.969 mm from the shoulder of arm 1",
+        ),
+        (
+            ["0", "0", "-1130", "0"],
+            "from the plane of its upper arm, closer than 20.000°",
+        ),
+        (["0", "0", "-767", "721"], "joint 4 would be at 721.000°"),
+    ] {
+        let mut args = vec!["inverse", "--robot", robot];
+        args.extend(place);
+        let said = refusal(&args);
+        assert!(said.contains(sentence), "{said}");
+    }
+    let said = refusal(&[
+        "inverse", "0", "0", "-767", "0", "--robot", robot, "--elbow", "left",
+    ]);
+    assert!(said.contains("leave out --elbow"), "{said}");
+    let said = refusal(&["forward", "0", "0", "120", "0", "--robot", robot]);
+    assert!(said.contains("joint 3 would be at 120.000°"), "{said}");
+}

@@ -311,3 +311,30 @@ fn run_says_what_limits_do_and_draws_them() {
         );
     }
 }
+
+#[test]
+fn a_delta_runs_its_pick_and_place() {
+    let out = TempDir::new().unwrap();
+    let robot = programs().join("../robots/delta-800.toml");
+    let program = programs().join("delta-pick-and-place.gcode");
+    let summary = json(&[
+        "run",
+        program.to_str().unwrap(),
+        "--robot",
+        robot.to_str().unwrap(),
+        "--json",
+        "--out",
+        out.path().to_str().unwrap(),
+    ]);
+    assert!((4.0..=5.0).contains(&number(&summary, "max_corner_error_mm")));
+    near(&summary, "settling_time_s", 0.0, 0.05);
+    assert!(number(&summary, "vibration_residual_ratio") < 0.02);
+    assert!(number(&summary, "joint3_peak_rad_s2") > 1.0);
+    assert_eq!(summary["joint3_peak_mm_s2"], Value::Null);
+    // Seen from the side, because it goes up and across.
+    let path = fs::read_to_string(out.path().join("path.svg")).unwrap();
+    assert!(path.contains("Z, mm") && !path.contains("Y, mm"));
+    for file in ["trace.csv", "feedrate.svg", "vibration.svg"] {
+        assert!(out.path().join(file).is_file(), "{file}");
+    }
+}

@@ -92,6 +92,15 @@ fn the_tick_costs_the_same_whatever_the_filters_length_and_the_segments() {
 }
 
 #[test]
+fn a_deltas_tick_stays_below_2500_instructions() {
+    let Some(counts) = counts() else { return };
+    println!("{counts:?}");
+    assert!((1000..=2500).contains(&counts["tick/delta"]), "{counts:?}");
+    assert!((300..=1200).contains(&counts["joint-state/delta"]));
+    assert!((200..=1200).contains(&counts["forward/delta"]));
+}
+
+#[test]
 fn a_corner_stays_below_60_000_instructions() {
     let Some(counts) = counts() else { return };
     for (name, count) in counts {

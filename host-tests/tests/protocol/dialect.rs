@@ -690,6 +690,7 @@ const REFUSALS: &[Row] = &[
     row("error:76", "", THERE, "M100 P6 Q1", &["error:76"]),
     row("error:77", "", NONE, "$11=-1", &["error:77"]),
     row("error:78", "", NONE, "$frequency=1.5", &["error:78"]),
+    row("error:79", "", &["$robot=delta"], "M101", &["error:79"]),
     row("error:80", "", NONE, "G64 P1 Q50", &["error:80"]),
     row("error:85", "", THERE, "M103 X210 Q50 R40", &["error:85"]),
 ];

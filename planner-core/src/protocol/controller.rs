@@ -1200,7 +1200,9 @@ impl Controller<'_> {
             self.stop_homing(Alarm::HomingDoor, report);
             return true;
         }
-        if !self.has_stopped(report) {
+        // A report may be older than a change of the robot: its joints are of another kind.
+        let is_current = report.setpoint.arm == self.robot().arm.kind();
+        if !self.has_stopped(report) || !is_current {
             return false;
         }
         let outcome = homing::Outcome {
