@@ -247,16 +247,34 @@ impl Robot {
     /// # Errors
     /// [`ConfigError`] names the value that is out of range; nothing is changed then.
     pub fn set_prefilter(&mut self, config: &PrefilterConfig) -> Result<(), ConfigError> {
-        let changed = RobotConfig {
-            prefilter: *config,
-            automatic: self.config.automatic && config.kind == self.config.prefilter.kind,
-            ..self.config
-        };
+        let changed = self.with_prefilter(config);
         let follower = follower(&changed)?;
         self.tune(&first_tuning(&changed, follower.as_ref()))?;
         self.follower = follower;
         self.config = changed;
         Ok(())
+    }
+
+    /// Whether the prefilter can be changed to that. Not inlined, so that what it makes is on the
+    /// stack for a moment only.
+    ///
+    /// # Errors
+    /// As [`Robot::set_prefilter`].
+    #[inline(never)]
+    pub fn check_prefilter(&self, config: &PrefilterConfig) -> Result<(), ConfigError> {
+        let changed = self.with_prefilter(config);
+        let follower = follower(&changed)?;
+        let prefilter = first_tuning(&changed, follower.as_ref()).prefilter()?;
+        Kernel::new(&prefilter)?;
+        Ok(())
+    }
+
+    fn with_prefilter(&self, config: &PrefilterConfig) -> RobotConfig {
+        RobotConfig {
+            prefilter: *config,
+            automatic: self.config.automatic && config.kind == self.config.prefilter.kind,
+            ..self.config
+        }
     }
 
     /// Goes on with a prefilter of this tuning.

@@ -583,17 +583,14 @@ impl<'q> Planner<'q> {
         Ok(timings)
     }
 
-    /// Whether the prefilter can be changed to these settings. Not inlined, so that the other
-    /// robot is on the stack for a moment only.
-    #[inline(never)]
+    /// Whether the prefilter can be changed to these settings.
     fn check_prefilter(&self, config: &PrefilterConfig) -> Result<(), Cause> {
         let own = &self.robot.config.prefilter;
         let says_mode = (config.frequency_hz, config.damping) != (own.frequency_hz, own.damping);
         if self.robot.config.map.is_complete() && says_mode {
             return Err(Cause::MapSaysMode);
         }
-        let changed = self.robot.clone().set_prefilter(config);
-        changed.map_err(Cause::Prefilter)
+        self.robot.check_prefilter(config).map_err(Cause::Prefilter)
     }
 
     /// A pick-and-place move that the arm can drive: up, across at the top and at the end of the
