@@ -2,7 +2,7 @@
 //! with the best prefilter for one frequency.
 
 use host_tests::plant::full::LATENCY_TICKS;
-use host_tests::plant::{FullConfig, FullPlant, JointSetpoint, Mode, ModeMap, ScaraArm};
+use host_tests::plant::{FullConfig, FullPlant, JointSetpoint, Mode, ModeMap};
 use host_tests::vector::{norm, sub};
 use host_tests::vibration::moving_samples;
 use planner_core::config::Robot;
@@ -38,22 +38,13 @@ fn moves(count: usize) -> Vec<String> {
 }
 
 fn joints(setpoint: &Setpoint) -> [f64; 4] {
-    let position = setpoint.joints.position;
-    [
-        position.joint1.to_num(),
-        position.joint2.to_num(),
-        position.joint3.to_num(),
-        position.joint4.to_num(),
-    ]
+    let units = setpoint.arm.joint_units();
+    setpoint.joints.position.values(units)
 }
 
 /// The tool's largest deflection from the flange after the arm has stopped, in mm.
 fn left_mm(setpoints: &[Setpoint], moving: usize) -> f64 {
     let mut plant = FullPlant::new(FullConfig {
-        arm: ScaraArm {
-            link1_mm: 200.0,
-            link2_mm: 150.0,
-        },
         mode: ModeMap::from_fn(|[x, y, _]| Mode {
             frequency_hz: frequency_hz(x, y),
             damping: f64::from(DAMPING),
