@@ -210,7 +210,7 @@ impl Follower {
         let source = match (config.method, config.shortest) {
             (PostureMethod::Local, None) => Source::Named(config.prefilter),
             (PostureMethod::Local, Some(shortest)) => {
-                let modes = config.map.used().iter().map(|node| Mode::from(node));
+                let modes = config.map.used().iter().map(Mode::from);
                 let found = Shortest::new(modes, &shortest).map_err(FollowError::Shortest)?;
                 Source::Shortest(found, config.prefilter)
             }
