@@ -107,5 +107,11 @@ pub fn settings(config: &RobotConfig) -> Vec<String> {
         });
         pairs.collect::<Vec<_>>().join(" ")
     };
-    RobotConfig::GROUPS.into_iter().map(line).collect()
+    let map = (0..).map_while(|line| config.map.line(line));
+    let map = map.map(|line| line.to_string());
+    RobotConfig::GROUPS
+        .into_iter()
+        .map(line)
+        .chain(map)
+        .collect()
 }

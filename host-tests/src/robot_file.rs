@@ -10,7 +10,7 @@ use planner_core::config::{ConfigError, Robot, RobotConfig};
 use planner_core::hop::{HopAxes, HopError};
 use planner_core::kinematics::{ArmKind, DeltaConfig, DeltaError, Elbow, JointRange, ScaraError};
 use planner_core::limits::{LimitsConfig, MotionLimits};
-use planner_core::posture::{FollowError, MapError};
+use planner_core::posture::{FollowError, MapError, MapNode, ModeMapConfig, PostureMethod};
 use planner_core::prefilter::{CustomImpulse, Kind, MAX_IMPULSES, PrefilterConfig, PrefilterError};
 use planner_core::servo::ServoConfig;
 use serde::{Deserialize, Deserializer};
@@ -96,7 +96,7 @@ impl RobotSettings {
                 reason: error.message().trim().replace('\n', ", "),
             }
         })?;
-        let settings = tables.settings();
+        let mut settings = tables.settings();
         let refused = |keys: &[&str], reason: String| {
             let present = keys.iter().find(|key| line_of(text, key).is_some());
             let key = present.or(keys.first()).copied();
@@ -107,6 +107,11 @@ impl RobotSettings {
                 reason,
             }
         };
+        if let Some(map) = &tables.map {
+            settings.robot.map = map
+                .config()
+                .map_err(|reason| refused(&["map.modes"], reason))?;
+        }
         Robot::new(&settings.robot)
             .map_err(|error| refused(&keys_of(&error), error.to_string()))?;
         settings
@@ -165,10 +170,11 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
             FollowError::Map(MapError::Size { .. }) => vec!["map.columns", "map.rows"],
             FollowError::Map(MapError::Place { axis: 'X' }) => vec!["map.x_mm"],
             FollowError::Map(MapError::Place { .. }) => vec!["map.y_mm"],
-            FollowError::Map(MapError::Frequency { .. }) => vec!["map.frequencies_hz"],
-            FollowError::Map(MapError::Damping { .. }) => vec!["map.dampings"],
+            FollowError::Map(MapError::Frequency { .. } | MapError::Damping { .. }) => {
+                vec!["map.modes"]
+            }
             FollowError::Prefilter(_) | FollowError::TooLong { .. } => {
-                vec!["map.frequencies_hz", "prefilter.name"]
+                vec!["prefilter.name", "map.modes"]
             }
             FollowError::Shortest(_) => vec!["prefilter.residual_limit", "prefilter.uncertainty"],
         },
@@ -190,6 +196,8 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
             "rapid" => vec!["motion.rapid_mm_s"],
             "feed-limit" => vec!["motion.feed_limit_mm_s"],
             "joint-speed" => vec!["motion.joint_speed_deg_s"],
+            "uncertainty" => vec!["prefilter.uncertainty"],
+            "residual-limit" => vec!["prefilter.residual_limit"],
             "yaw-limit" => vec!["motion.yaw_limit_deg_s"],
             name => limit_key(name).into_iter().collect(),
         },
@@ -230,6 +238,7 @@ struct Tables {
     arm: ArmTable,
     delta: DeltaTable,
     prefilter: PrefilterTable,
+    map: Option<MapTable>,
     motion: MotionTable,
     hop: HopTable,
     limits: LimitsTable,
@@ -304,6 +313,11 @@ struct PrefilterTable {
     s_curve_jerk_mm_s3: Option<f32>,
     smoothing1_ms: Option<f32>,
     smoothing2_ms: Option<f32>,
+    #[serde(deserialize_with = "method_name")]
+    posture_method: Option<PostureMethod>,
+    automatic: Option<bool>,
+    uncertainty: Option<f32>,
+    residual_limit: Option<f32>,
     mode2: SecondModeTable,
     #[serde(deserialize_with = "impulses")]
     impulses: Option<[CustomImpulse; MAX_IMPULSES]>,
@@ -323,6 +337,40 @@ struct SecondModeTable {
 struct ImpulseTable {
     time_ms: f32,
     weight: f32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MapTable {
+    x_mm: [f32; 2],
+    y_mm: [f32; 2],
+    columns: u8,
+    rows: u8,
+    /// Frequency in Hz and damping ratio of each node.
+    modes: Vec<[f32; 2]>,
+}
+
+impl MapTable {
+    fn config(&self) -> Result<ModeMapConfig, String> {
+        let wanted = usize::from(self.columns) * usize::from(self.rows);
+        let given = self.modes.len();
+        if given != wanted {
+            return Err(format!(
+                "the map has {given} modes and room for {wanted}: give one for each column and row"
+            ));
+        }
+        let mut map = ModeMapConfig {
+            x_mm: self.x_mm,
+            y_mm: self.y_mm,
+            columns: self.columns,
+            rows: self.rows,
+            ..ModeMapConfig::NONE
+        };
+        for (node, [frequency_hz, damping]) in map.nodes.iter_mut().zip(&self.modes) {
+            *node = MapNode::new(*frequency_hz, *damping);
+        }
+        Ok(map)
+    }
 }
 
 #[derive(Deserialize, Default)]
@@ -516,6 +564,16 @@ pub fn custom_impulses(given: &[CustomImpulse]) -> Option<[CustomImpulse; MAX_IM
     (!given.is_empty()).then_some(all)
 }
 
+fn method_name<'de, D: Deserializer<'de>>(text: D) -> Result<Option<PostureMethod>, D::Error> {
+    let name = String::deserialize(text)?;
+    let known = || PostureMethod::ALL.map(PostureMethod::name).join(", ");
+    let unknown = || format!("there is no method `{name}`: give one of {}", known());
+    let method = PostureMethod::from_name(&name);
+    Ok(Some(
+        method.ok_or_else(|| serde::de::Error::custom(unknown()))?,
+    ))
+}
+
 impl Tables {
     fn settings(&self) -> RobotSettings {
         let mut robot = RobotConfig::default();
@@ -541,6 +599,10 @@ impl Tables {
         set(&mut robot.arm, self.robot.map(ArmKind::from));
         self.delta.apply(&mut robot.delta);
         self.prefilter.apply(&mut robot.prefilter);
+        set(&mut robot.posture_method, self.prefilter.posture_method);
+        set(&mut robot.automatic, self.prefilter.automatic);
+        set(&mut robot.shortest.uncertainty, self.prefilter.uncertainty);
+        set(&mut robot.shortest.limit, self.prefilter.residual_limit);
         let motion = &self.motion;
         set(&mut robot.corner_tolerance_mm, motion.corner_tolerance_mm);
         set(
@@ -797,6 +859,18 @@ mod tests {
     }
 
     #[test]
+    fn a_map_is_a_table() {
+        let text = "[map]\nx_mm = [100, 300]\ny_mm = [-50, 50]\ncolumns = 2\nrows = 2\n\
+                    modes = [[8, 0.02], [9, 0.02], [10, 0.03], [11.5, 0.04]]\n\
+                    [prefilter]\nposture_method = 'hybrid'\nautomatic = true";
+        let robot = RobotSettings::parse("r.toml", text).unwrap().robot;
+        assert!(robot.map.is_complete());
+        assert_eq!(robot.map.used()[3], MapNode::new(11.5, 0.04));
+        assert_eq!(robot.posture_method, PostureMethod::Hybrid);
+        assert!(robot.automatic);
+    }
+
+    #[test]
     fn errors_name_file_line_and_key() {
         for (text, expected) in [
             (
@@ -892,6 +966,26 @@ mod tests {
             (
                 "[plant.payload]\nlength_mm = 0",
                 "r.toml, line 2, key plant.payload.length_mm: 0 is outside 1 to 2000",
+            ),
+            (
+                "[prefilter]\nposture_method = 'c'",
+                "key prefilter.posture_method: there is no method `c`",
+            ),
+            (
+                "[prefilter]\nuncertainty = 0.6",
+                "r.toml, line 2, key prefilter.uncertainty: the setting uncertainty",
+            ),
+            (
+                "[map]\nx_mm = [0, 9]\ny_mm = [0, 9]\ncolumns = 2\nrows = 1\nmodes = [[8, 0.1]]",
+                "r.toml, line 6, key map.modes: the map has 1 modes and room for 2",
+            ),
+            (
+                "[map]\nx_mm = [9, 0]\ny_mm = [0, 9]\ncolumns = 1\nrows = 1\nmodes = [[8, 0.1]]",
+                "r.toml, line 2, key map.x_mm: the map's last place along X",
+            ),
+            (
+                "[map]\nx_mm = [0, 9]\ny_mm = [0, 9]\ncolumns = 1\nrows = 1\nmodes = [[2, 0.1]]",
+                "key map.modes: the prefilter for the map's slowest mode is",
             ),
             ("[arm\n", "r.toml, line 1: "),
         ] {

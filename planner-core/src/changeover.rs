@@ -2,6 +2,7 @@
 
 use crate::pose::AXES;
 use crate::prefilter::{ConvolverPair, Kernel};
+use crate::rate::Rate;
 use crate::raw::TickTime;
 use crate::walker::Ahead;
 
@@ -33,6 +34,8 @@ pub struct Changeover {
     kernels: [Kernel; 2],
     /// Which of the two is in force.
     second: bool,
+    /// A kernel waits in the queue that is to come into force.
+    is_expected: bool,
     next: Option<Next>,
     fade: Fade,
 }
@@ -42,8 +45,10 @@ pub struct Changeover {
 struct Next {
     /// How far ahead its raw path is: `m' − m`.
     ahead: TickTime,
-    /// Ticks for which its filter has been fed with an even motion; none if it has to be reset.
-    fed_for: Option<u16>,
+    /// The rate at which its filter has been fed, and for how many ticks; zero if it has to be
+    /// reset.
+    pace: Rate,
+    fed_for: u16,
 }
 
 /// What the filter left behind was ahead by, on its way to nothing.
@@ -55,12 +60,13 @@ struct Fade {
 }
 
 impl Fade {
-    /// What is left of it in this tick.
-    fn step(&mut self) -> [i64; AXES] {
+    /// An output with what is left of it in this tick.
+    #[inline(never)]
+    fn step(&mut self, output: [i64; AXES]) -> [i64; AXES] {
         self.ticks = self.ticks.saturating_sub(1);
         let part = i64::from(self.ticks);
-        self.offset
-            .map(|value| value.wrapping_mul(part) / i64::from(FADE_TICKS))
+        let left = |value: i64| value.wrapping_mul(part) / i64::from(FADE_TICKS);
+        core::array::from_fn(|axis| output[axis].wrapping_add(left(self.offset[axis])))
     }
 }
 
@@ -70,6 +76,7 @@ impl Changeover {
         Self {
             kernels: [kernel.clone(), kernel.clone()],
             second: false,
+            is_expected: false,
             next: None,
             fade: Fade::default(),
         }
@@ -88,26 +95,40 @@ impl Changeover {
 
     /// Puts the filter in force to rest at a point, and forgets what is to be changed.
     pub fn rest_at(&mut self, filters: &mut ConvolverPair<AXES>, point: [i32; AXES]) {
+        self.is_expected = false;
         self.next = None;
         self.fade = Fade::default();
         filters.reset(self.second, point);
     }
 
-    /// A segment has begun on whose way this kernel is to come into force.
+    /// A segment has begun on whose way the oldest kernel that waits is to come into force. It
+    /// is taken later, because that costs as much as a filter.
+    pub fn expect(&mut self) {
+        self.is_expected = true;
+    }
+
+    /// Whether that kernel still has to be taken.
+    pub fn is_expected(&self) -> bool {
+        self.is_expected
+    }
+
+    /// Takes the kernel that is to come into force.
     pub fn prepare(&mut self, kernel: Kernel) {
+        self.is_expected = false;
         self.next = Some(Next {
             ahead: kernel.centroid() - self.kernel().centroid(),
-            fed_for: None,
+            pace: Rate::ZERO,
+            fed_for: 0,
         });
         self.put(!self.second, kernel);
     }
 
     /// Whether a kernel is to come into force.
     pub fn is_due(&self) -> bool {
-        self.next.is_some()
+        self.is_expected || self.next.is_some()
     }
 
-    /// How far ahead the raw path of the kernel to come is; none if none is to come.
+    /// How far ahead the raw path of the kernel to come is; none if none has been taken.
     pub fn ahead(&self) -> Option<TickTime> {
         self.next.map(|next| next.ahead)
     }
@@ -131,8 +152,7 @@ impl Changeover {
         if self.fade.ticks == 0 {
             return output;
         }
-        let left = self.fade.step();
-        core::array::from_fn(|axis| output[axis].wrapping_add(left[axis]))
+        self.fade.step(output)
     }
 
     /// Feeds the filter to come, if its raw path moves evenly, and yields by how much that path
@@ -144,8 +164,8 @@ impl Changeover {
         command: [i64; AXES],
     ) -> Option<TickTime> {
         let next = self.next.as_mut()?;
-        let Some(Ahead { chord, even_for }) = ahead.filter(|_| filters.is_shared()) else {
-            next.fed_for = None;
+        let Some(Ahead { chord, pace }) = ahead.filter(|_| filters.is_shared()) else {
+            next.pace = Rate::ZERO;
             return None;
         };
         let [one, other] = &self.kernels;
@@ -154,17 +174,17 @@ impl Changeover {
         } else {
             (one, other)
         };
-        let fed_for = match next.fed_for {
-            // a change of the rate
-            Some(fed_for) if even_for > 1 => fed_for.saturating_add(1),
-            _ => {
-                filters.reset(!self.second, chord);
-                0
-            }
-        };
-        next.fed_for = Some(fed_for);
+        if next.pace == pace {
+            next.fed_for = next.fed_for.saturating_add(1);
+        } else {
+            next.pace = pace;
+            next.fed_for = 0;
+            filters.reset(!self.second, chord);
+        }
+        let fed_for = next.fed_for;
         let output = filters.process(!self.second, coming, chord);
-        if fed_for <= coming.length_ticks() || even_for <= left.length_ticks() {
+        // the one in force has seen nothing else for at least as long
+        if fed_for <= coming.length_ticks() || fed_for <= left.length_ticks() {
             return None;
         }
         let jump = next.ahead;
@@ -235,7 +255,7 @@ mod tests {
                 let centroid = ticks(changeover.kernel().centroid());
                 let seen = changeover.ahead().and_then(|ahead| {
                     let chord = sample(at + ticks(ahead));
-                    (at + ticks(ahead) > 0.0).then_some(Ahead { chord, even_for: tick })
+                    (at + ticks(ahead) > 0.0).then_some(Ahead { chord, pace: Rate::ONE })
                 });
                 let steady = tick > first.length_ticks() + 2;
                 let exact = (at - centroid) * per_bit * BIT;

@@ -9,7 +9,10 @@ use crate::kinematics::{
 };
 use crate::limits::{Limits, LimitsConfig, MotionLimits, Part, with_boxes};
 use crate::pose::AXES;
-use crate::posture::{FollowConfig, FollowError, Follower, ModeMapConfig, PostureMethod, Tuning};
+use crate::posture::{
+    FollowConfig, FollowError, Follower, MapNode, ModeMapConfig, PostureMethod, ShortestConfig,
+    Tuning,
+};
 use crate::prefilter::{Kernel, Kind, Prefilter, PrefilterConfig, PrefilterError, Response};
 
 /// Everything that a builder sets.
@@ -27,6 +30,11 @@ pub struct RobotConfig {
     pub map: ModeMapConfig,
     /// What the prefilters that follow the map are made from.
     pub posture_method: PostureMethod,
+    /// Whether each move gets the shortest prefilter that leaves little enough, instead of the
+    /// named one.
+    pub automatic: bool,
+    /// What that prefilter has to achieve.
+    pub shortest: ShortestConfig,
     /// Corner tolerance in mm where the program gives none, 0 to 100; 0 stops at corners.
     pub corner_tolerance_mm: f32,
     /// Corner overlap in percent where the program gives no tolerance, above 0 to 100: instead of
@@ -55,6 +63,11 @@ impl Default for RobotConfig {
             prefilter: PrefilterConfig::default(),
             map: ModeMapConfig::NONE,
             posture_method: PostureMethod::Local,
+            automatic: false,
+            shortest: ShortestConfig {
+                uncertainty: 0.05,
+                limit: 0.05,
+            },
             corner_tolerance_mm: 0.5,
             corner_overlap_percent: 0.0,
             rapid_mm_s: 160.0,
@@ -134,7 +147,7 @@ impl fmt::Display for ConfigError {
                 "limits of motion are not kept by a delta robot yet: leave them out",
             ),
             Self::LimitsOnMap => f.write_str(
-                "limits of acceleration and jerk are not kept while the prefilter follows a map of the mode: leave out the map or those limits",
+                "limits of acceleration and jerk are not kept while the prefilter follows a map of the mode or is chosen automatically: leave out either",
             ),
             Self::Range {
                 name,
@@ -187,6 +200,8 @@ impl Robot {
             ("feed-limit", config.feed_limit_mm_s, 0.001, 10_000.0),
             ("yaw-limit", config.yaw_limit_deg_s, 0.001, 10_000.0),
             ("joint-speed", config.joint_speed_deg_s, 0.001, 10_000.0),
+            ("uncertainty", config.shortest.uncertainty, 0.0, 0.5),
+            ("residual-limit", config.shortest.limit, 0.001, 1.0),
         ];
         for (name, value, low, high) in checks {
             if !(low..=high).contains(&value) {
@@ -226,20 +241,40 @@ impl Robot {
         self.arm.set_elbow(elbow);
     }
 
-    /// Changes the prefilter; with a map, the kind that follows it.
+    /// Changes the prefilter; with a map, the kind that follows it. Another kind is not chosen
+    /// automatically any more.
     ///
     /// # Errors
     /// [`ConfigError`] names the value that is out of range; nothing is changed then.
     pub fn set_prefilter(&mut self, config: &PrefilterConfig) -> Result<(), ConfigError> {
-        let changed = RobotConfig {
-            prefilter: *config,
-            ..self.config
-        };
+        let changed = self.with_prefilter(config);
         let follower = follower(&changed)?;
         self.tune(&first_tuning(&changed, follower.as_ref()))?;
         self.follower = follower;
         self.config = changed;
         Ok(())
+    }
+
+    /// Whether the prefilter can be changed to that. Not inlined, so that what it makes is on the
+    /// stack for a moment only.
+    ///
+    /// # Errors
+    /// As [`Robot::set_prefilter`].
+    #[inline(never)]
+    pub fn check_prefilter(&self, config: &PrefilterConfig) -> Result<(), ConfigError> {
+        let changed = self.with_prefilter(config);
+        let follower = follower(&changed)?;
+        let prefilter = first_tuning(&changed, follower.as_ref()).prefilter()?;
+        Kernel::new(&prefilter)?;
+        Ok(())
+    }
+
+    fn with_prefilter(&self, config: &PrefilterConfig) -> RobotConfig {
+        RobotConfig {
+            prefilter: *config,
+            automatic: self.config.automatic && config.kind == self.config.prefilter.kind,
+            ..self.config
+        }
     }
 
     /// Goes on with a prefilter of this tuning.
@@ -248,13 +283,19 @@ impl Robot {
     /// [`PrefilterError`] names the value that is out of range; nothing is changed then.
     pub fn tune(&mut self, tuning: &Tuning) -> Result<(), PrefilterError> {
         let prefilter = prefilter_of(&self.config, &self.arm, tuning)?;
-        self.kernel = Kernel::new(&prefilter)?;
+        let kernel = Kernel::new(&prefilter)?;
+        self.take_up(tuning, prefilter, kernel);
+        Ok(())
+    }
+
+    /// Goes on with a prefilter that has been made of a tuning.
+    pub(crate) fn take_up(&mut self, tuning: &Tuning, prefilter: Prefilter, kernel: Kernel) {
+        self.kernel = kernel;
         self.limits = Limits::new(&self.config, &self.arm, &prefilter);
         self.accelerating = prefilter.response();
         self.decelerating = prefilter.reversed_response();
         self.prefilter = prefilter;
         self.tuning = *tuning;
-        Ok(())
     }
 
     /// The boxes that the prefilter was given because limits need them, in s.
@@ -282,7 +323,7 @@ fn check_limits(config: &RobotConfig) -> Result<(), ConfigError> {
     if config.arm == ArmKind::Delta && *limits != LimitsConfig::default() {
         return Err(ConfigError::LimitsOnDelta);
     }
-    if config.map.is_some() && limits.boxes_needed() > 0 {
+    if (config.map.is_some() || config.automatic) && limits.boxes_needed() > 0 {
         return Err(ConfigError::LimitsOnMap);
     }
     for (part, values) in limits.all() {
@@ -314,15 +355,23 @@ const fn limit_names(part: Part) -> &'static [&'static str; 3] {
     }
 }
 
-/// What chooses the prefilters of each move, if there is a map.
+/// What chooses the prefilters of each move, if there is a map or a choice.
 fn follower(config: &RobotConfig) -> Result<Option<Follower>, ConfigError> {
-    if !config.map.is_some() {
-        return Ok(None);
-    }
+    let PrefilterConfig {
+        frequency_hz,
+        damping,
+        ..
+    } = config.prefilter;
+    let everywhere = ModeMapConfig::constant(MapNode::new(frequency_hz, damping));
+    let map = match (config.map.is_complete(), config.automatic) {
+        (true, _) => &config.map,
+        (false, true) => &everywhere,
+        (false, false) => return Ok(None),
+    };
     let follow = FollowConfig {
-        map: &config.map,
-        kind: config.prefilter.kind,
-        shortest: None,
+        map,
+        prefilter: config.prefilter,
+        shortest: config.automatic.then_some(config.shortest),
         method: config.posture_method,
     };
     let follower = Follower::new(&follow).map_err(ConfigError::Follow)?;
@@ -361,6 +410,8 @@ enum Slot<'a> {
     Elbow(&'a mut Elbow),
     Arm(&'a mut ArmKind),
     HopAxes(&'a mut HopAxes),
+    Method(&'a mut PostureMethod),
+    Switch(&'a mut bool),
 }
 
 /// The value of a setting, as text shows it.
@@ -396,7 +447,7 @@ impl RobotConfig {
     /// Names of all settings, in groups whose values must fit each other: lengths in mm, angles
     /// in °, the frequency in Hz, feedrates in mm/s, the yaw limit in °/s, limits of joints 1, 2 and 4
     /// in °, the others in mm.
-    pub const GROUPS: [&'static [&'static str]; 27] = [
+    pub const GROUPS: [&'static [&'static str]; 28] = [
         &[
             "robot",
             "delta-base",
@@ -434,6 +485,12 @@ impl RobotConfig {
             "impulse5-weight",
         ],
         &["impulse2-ms", "impulse3-ms", "impulse4-ms", "impulse5-ms"],
+        &[
+            "posture-method",
+            "automatic",
+            "uncertainty",
+            "residual-limit",
+        ],
         &["tolerance"],
         &["overlap"],
         &["rapid"],
@@ -488,12 +545,25 @@ impl RobotConfig {
     pub fn set(&mut self, text: &str) -> Result<(), SettingError> {
         let (name, value) = text.split_once('=').ok_or(SettingError::Value)?;
         let value = value.trim();
+        if let Some(is_read) = self.set_map(name.trim(), value) {
+            return is_read.then_some(()).ok_or(SettingError::Value);
+        }
         match self.slot(name.trim()).ok_or(SettingError::Unknown)? {
             Slot::Number(number) => *number = value.parse().map_err(|_| SettingError::Value)?,
             Slot::Prefilter(kind) => *kind = Kind::from_name(value).ok_or(SettingError::Value)?,
             Slot::Elbow(elbow) => *elbow = named(&ELBOWS, value).ok_or(SettingError::Value)?,
             Slot::Arm(arm) => *arm = named(&ARMS, value).ok_or(SettingError::Value)?,
             Slot::HopAxes(axes) => *axes = HopAxes::from_name(value).ok_or(SettingError::Value)?,
+            Slot::Method(method) => {
+                *method = PostureMethod::from_name(value).ok_or(SettingError::Value)?;
+            }
+            Slot::Switch(switch) => {
+                *switch = match value {
+                    "0" => false,
+                    "1" => true,
+                    _ => return Err(SettingError::Value),
+                };
+            }
         }
         Ok(())
     }
@@ -517,6 +587,11 @@ impl RobotConfig {
             Some(Slot::HopAxes(axes)) => {
                 *axes = HopAxes::ALL.get(value as usize).copied().unwrap_or(*axes);
             }
+            Some(Slot::Method(method)) => {
+                let all = PostureMethod::ALL;
+                *method = all.get(value as usize).copied().unwrap_or(*method);
+            }
+            Some(Slot::Switch(switch)) => *switch = value != 0.0,
             None => {}
         }
     }
@@ -531,7 +606,14 @@ impl RobotConfig {
             Slot::Elbow(elbow) => SettingValue::Name(name_of(&ELBOWS, elbow)),
             Slot::Arm(arm) => SettingValue::Name(name_of(&ARMS, arm)),
             Slot::HopAxes(axes) => SettingValue::Name(axes.name()),
+            Slot::Method(method) => SettingValue::Name(method.name()),
+            Slot::Switch(switch) => SettingValue::Number(f32::from(u8::from(*switch))),
         })
+    }
+
+    /// Sets part of the map: see [`ModeMapConfig::set`].
+    pub(crate) fn set_map(&mut self, key: &str, value: &str) -> Option<bool> {
+        self.map.set(key, value)
     }
 
     fn slot(&mut self, name: &str) -> Option<Slot<'_>> {
@@ -588,6 +670,10 @@ impl RobotConfig {
             "impulse3-ms" => Slot::Number(&mut impulse3.time_ms),
             "impulse4-ms" => Slot::Number(&mut impulse4.time_ms),
             "impulse5-ms" => Slot::Number(&mut impulse5.time_ms),
+            "posture-method" => Slot::Method(&mut self.posture_method),
+            "automatic" => Slot::Switch(&mut self.automatic),
+            "uncertainty" => Slot::Number(&mut self.shortest.uncertainty),
+            "residual-limit" => Slot::Number(&mut self.shortest.limit),
             "tolerance" => Slot::Number(&mut self.corner_tolerance_mm),
             "overlap" => Slot::Number(&mut self.corner_overlap_percent),
             "rapid" => Slot::Number(&mut self.rapid_mm_s),

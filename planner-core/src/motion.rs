@@ -9,7 +9,6 @@ use crate::pose::{AXES, JointPosition, JointState, Pose};
 use crate::prefilter::{Convolver, ConvolverPair, FINE_BITS, Kernel};
 use crate::queue::{Action, RawItem, SegmentConsumer};
 use crate::rate::Rate;
-use crate::raw::TickTime;
 use crate::units::TICK_HZ;
 use crate::walker::{MayBegin, Rates, Walker};
 
@@ -412,10 +411,9 @@ impl<'q> Motion<'q> {
         let [bow_x, bow_y] = self.arcs.step(&mut self.filters.arcs, kernel, &raw);
         let line = self.changeover.step(&mut self.filters.lines, chord);
         if changes_over {
-            self.prepare_changeover();
-        }
-        if let Some(ahead) = self.changeover.ahead() {
-            self.approach_changeover(ahead, line);
+            self.changeover.expect();
+        } else if self.changeover.is_due() {
+            self.approach_changeover(line);
         }
         self.stood_for = if moved {
             0
@@ -425,6 +423,7 @@ impl<'q> Motion<'q> {
         // the filters and then the two ticks of history have settled
         let settled = self.stood_for > self.changeover.kernel().delay_ticks() + 1;
         if settled && self.changeover.has_faded() {
+            self.take_expected_kernel();
             self.changeover.come_to_rest(&mut self.filters.lines, chord);
             self.come_to_rest();
             return self.history[1];
@@ -439,22 +438,26 @@ impl<'q> Motion<'q> {
         [x.wrapping_add(bow_x), y.wrapping_add(bow_y), z, c]
     }
 
-    /// The segment that has begun brings a kernel that is to come into force on its way.
-    #[inline(never)]
-    fn prepare_changeover(&mut self) {
-        if let Some(kernel) = self.walker.take_kernel() {
+    /// Takes the kernel that is to come into force on the way of the segment that has begun.
+    fn take_expected_kernel(&mut self) {
+        if self.changeover.is_expected()
+            && let Some(kernel) = self.walker.take_kernel()
+        {
             self.changeover.prepare(kernel);
         }
     }
 
-    /// Feeds the filter to come, and changes over to it where that does not show.
+    /// Feeds the filter to come, and changes over to it where that does not show. While an arc
+    /// is in flight neither its filters nor the tick's time allow for that.
     #[inline(never)]
-    fn approach_changeover(&mut self, ahead: TickTime, line: [i64; AXES]) {
-        let seen = if self.arcs.are_clear() {
-            self.walker.look_ahead(ahead)
-        } else {
-            None
+    fn approach_changeover(&mut self, line: [i64; AXES]) {
+        if !self.arcs.are_clear() {
+            return;
+        }
+        let Some(ahead) = self.changeover.ahead() else {
+            return self.take_expected_kernel();
         };
+        let seen = self.walker.look_ahead(ahead);
         let lines = &mut self.filters.lines;
         if let Some(jump) = self.changeover.approach(lines, seen, line) {
             self.walker.jump(jump);

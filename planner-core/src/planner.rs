@@ -14,7 +14,7 @@ use crate::path::{PathSegment, Shape};
 use crate::pose::{JointPosition, Pose};
 use crate::posture::{MoveToFollow, MoveTunings, Tuning};
 use crate::prefilter::{Kernel, PrefilterConfig};
-use crate::queue::{KERNELS_A_LINE, SegmentProducer};
+use crate::queue::{KERNELS_A_MOVE, SegmentProducer};
 use crate::raw::{LONGEST_S, Pace};
 use crate::schedule::{Schedule, Timing};
 use crate::units::{AngleRad, LengthMm, TICK_S};
@@ -175,7 +175,7 @@ impl<'q> Planner<'q> {
             return places >= MAX_ACTIONS_A_LINE;
         }
         // a change of the prefilter before each move
-        places >= MAX_ACTIONS_A_LINE + 2 && self.schedule.free_kernels() >= KERNELS_A_LINE
+        places >= MAX_ACTIONS_A_LINE + 2 && self.schedule.free_kernels() >= KERNELS_A_MOVE
     }
 
     /// Segments that the look-ahead has room for.
@@ -452,26 +452,33 @@ impl<'q> Planner<'q> {
     fn plan_move(&mut self, order: &Move, timing: &Timing) -> bool {
         let next = self.follow(order, timing);
         // a map whose slowest mode has a prefilter has one for every mode
-        let next = next.and_then(|tuning| Some((tuning, tuning.prefilter().ok()?)));
-        let next = next.and_then(|(tuning, it)| Some((tuning, Kernel::new(&it).ok()?)));
+        let next = next.and_then(|tuning| {
+            let prefilter = tuning.prefilter().ok()?;
+            let kernel = Kernel::new(&prefilter).ok()?;
+            Some((tuning, prefilter, kernel))
+        });
         let queued = self.schedule.plan(
             &self.robot,
             &order.path,
             timing,
             order.corner,
             order.line,
-            next.as_ref().map(|(_, kernel)| kernel),
+            next.as_ref().map(|(_, _, kernel)| kernel),
         );
-        if let Some((tuning, _)) = next {
-            let _ = self.robot.tune(&tuning);
+        if let Some((tuning, prefilter, kernel)) = next {
+            self.robot.take_up(&tuning, prefilter, kernel);
         }
         queued
     }
 
     /// Changes the prefilter before a move from rest as the map asks for, and yields the one
-    /// to which it is to change on the move's way.
+    /// to which it is to change on the move's way. The second move of a line keeps the prefilter
+    /// if the first one has taken the last places for kernels.
     fn follow(&mut self, order: &Move, timing: &Timing) -> Option<Tuning> {
         let follower = self.robot.follower.as_ref()?;
+        if self.schedule.free_kernels() < KERNELS_A_MOVE {
+            return None;
+        }
         let from_rest = self.schedule.begins_from_rest(order.corner);
         let step = MoveToFollow {
             course: follower.course(&order.path),
@@ -576,17 +583,14 @@ impl<'q> Planner<'q> {
         Ok(timings)
     }
 
-    /// Whether the prefilter can be changed to these settings. Not inlined, so that the other
-    /// robot is on the stack for a moment only.
-    #[inline(never)]
+    /// Whether the prefilter can be changed to these settings.
     fn check_prefilter(&self, config: &PrefilterConfig) -> Result<(), Cause> {
         let own = &self.robot.config.prefilter;
         let says_mode = (config.frequency_hz, config.damping) != (own.frequency_hz, own.damping);
-        if self.robot.follower.is_some() && says_mode {
+        if self.robot.config.map.is_complete() && says_mode {
             return Err(Cause::MapSaysMode);
         }
-        let changed = self.robot.clone().set_prefilter(config);
-        changed.map_err(Cause::Prefilter)
+        self.robot.check_prefilter(config).map_err(Cause::Prefilter)
     }
 
     /// A pick-and-place move that the arm can drive: up, across at the top and at the end of the

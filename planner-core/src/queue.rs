@@ -13,13 +13,13 @@ use crate::raw::RawSegment;
 /// 64 segments of 0.5 mm at 160 mm/s last 0.2 s, longer than a serial line hesitates.
 pub const LOOKAHEAD: usize = 64;
 
-/// Kernels that can wait: with a map of the mode a move may need two, one at its start and one
-/// on its way. Seven such moves fill the time that the look-ahead lasts; with no room left the
-/// next segment waits.
-pub const KERNELS: usize = 8;
+/// Kernels that can wait. With a map of the mode a move may need two, one at its start and one
+/// on its way; it lasts longer than its prefilter then, so that two such moves are look-ahead
+/// enough.
+pub const KERNELS: usize = 4;
 
-/// Kernels that a line may need: two moves with two each.
-pub const KERNELS_A_LINE: usize = 4;
+/// Kernels that a move may need.
+pub const KERNELS_A_MOVE: usize = 2;
 
 /// Pick-and-place moves that can wait: each lasts some tenths of a second.
 pub const HOPS: usize = 3;

@@ -36,6 +36,7 @@ const fn key(record: Record) -> u8 {
         Record::Settings => 1,
         Record::Offsets => 2,
         Record::BuildName => 3,
+        Record::Map => 4,
         Record::StartupLine(line) => 8 + (line & 1),
     }
 }

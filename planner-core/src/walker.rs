@@ -30,8 +30,8 @@ pub struct RawStep<'s> {
 pub struct Ahead {
     /// The point so much further along the segment.
     pub chord: [i32; AXES],
-    /// Ticks for which the raw point has moved evenly.
-    pub even_for: u16,
+    /// The rate of the last tick, in which nothing began or ended.
+    pub pace: Rate,
 }
 
 /// The rates that the raw path is walked at.
@@ -100,7 +100,6 @@ impl Stand {
             since_corner: self.time.wrapping_add(wait),
             licence,
             pace: Rate::ZERO,
-            even_for: 0,
             hop_rate: wanted.min(Rate::ONE),
         };
         way.advance(next, wanted.min(licence).raw(left - wait), left - wait);
@@ -136,10 +135,8 @@ struct Way {
     since_corner: TickTime,
     /// The highest rate that the corners on both sides allow for, at least 1.
     licence: Rate,
-    /// The rate of the last tick.
+    /// The rate of the last tick; zero if only a part of it was moved in.
     pace: Rate,
-    /// Whole ticks at that rate in a row.
-    even_for: u16,
     /// The rate of the moment along a hop.
     hop_rate: Rate,
 }
@@ -332,13 +329,13 @@ impl<'q> Walker<'q> {
         let (Walk::Moving(way), Some(segment)) = (&self.walk, self.queue.segment()) else {
             return None;
         };
-        if way.even_for == 0 {
+        if way.pace == Rate::ZERO {
             return None;
         }
         let (progress, _) = way.ahead(segment, ahead)?;
         Some(Ahead {
             chord: segment.chord_point(to_unit(progress)),
-            even_for: way.even_for,
+            pace: way.pace,
         })
     }
 
@@ -424,7 +421,6 @@ impl<'q> Walker<'q> {
         if self.held && !segment.is_hop {
             way.since_corner = way.since_corner.wrapping_add(ONE_TICK);
             way.pace = Rate::ZERO;
-            way.even_for = 0;
             return Gone {
                 ended: false,
                 moved: false,
@@ -444,11 +440,6 @@ impl<'q> Walker<'q> {
         let share = rate.raw(ONE_TICK);
         if way.remaining > share {
             way.advance(segment, share, ONE_TICK);
-            way.even_for = if way.pace == rate {
-                way.even_for.saturating_add(1)
-            } else {
-                1
-            };
             way.pace = rate;
             return Gone {
                 ended: false,

@@ -18,6 +18,7 @@ use planner_core::orientation::Orientation;
 use planner_core::overlap::{Method, Move, Segment, SpeedCurve, ToolPose, ToolState, plan};
 use planner_core::planner::Planner;
 use planner_core::pose::{JointState, Pose};
+use planner_core::posture::{MapNode, ModeMapConfig};
 use planner_core::prefilter::{Kind, PrefilterConfig};
 use planner_core::protocol::{Controller, Identity, Report, Settings, Step};
 use planner_core::queue::SegmentQueue;
@@ -67,6 +68,18 @@ fn main() -> ! {
         bench.print(format_args!("{name}"), worst);
     }
     let filters = FILTERS.take();
+    programs(&mut bench, filters);
+    programs_with_map(&mut bench, filters);
+    deltas(&mut bench, filters);
+    link(&mut bench, filters);
+    corners(&mut bench);
+    bench.end()
+}
+
+// Each on its own, so that one robot at a time is on the stack.
+
+#[inline(never)]
+fn programs(bench: &mut Bench, filters: &mut DelayLines) {
     for (program, text) in PROGRAMS {
         for (filter, kind, frequency_hz) in [
             ("fir-zvd", Kind::FirZvd, 6.34),
@@ -75,18 +88,20 @@ fn main() -> ! {
             ("ei", Kind::Ei, 6.34),
             ("s-curve", Kind::SCurve, 6.34),
         ] {
-            let robot = robot(kind, frequency_hz);
-            let cost = bench.run(&robot, text, filters, 100);
+            let cost = bench.run(&robot(kind, frequency_hz), text, filters, 100);
             bench.print(format_args!("tick/{program}/{filter}"), cost.tick);
             bench.print(format_args!("line/{program}/{filter}"), cost.line);
             bench.print(format_args!("line-mean/{program}/{filter}"), cost.line_mean);
         }
-        let robot = robot(Kind::FirZvd, 6.34);
         for percent in [63, 137] {
-            let cost = bench.run(&robot, text, filters, percent);
+            let cost = bench.run(&robot(Kind::FirZvd, 6.34), text, filters, percent);
             bench.print(format_args!("tick/{program}/at-{percent}"), cost.tick);
         }
     }
+}
+
+#[inline(never)]
+fn deltas(bench: &mut Bench, filters: &mut DelayLines) {
     let delta = delta(Kind::FirZvd, 6.34);
     let worst = bench.run(&delta, DELTA_PROGRAM, filters, 100);
     bench.print(format_args!("tick/delta"), worst.tick);
@@ -105,29 +120,71 @@ fn main() -> ! {
         bench.print(format_args!("joint-state/{name}"), worst.joint_state);
         bench.print(format_args!("forward/{name}"), worst.forward);
     }
+}
+
+#[inline(never)]
+fn programs_with_map(bench: &mut Bench, filters: &mut DelayLines) {
+    for (program, text) in PROGRAMS {
+        for (filter, kind) in [("fir-zvd", Kind::FirZvd), ("ei", Kind::Ei)] {
+            let worst = bench.run(&robot_with_map(kind), text, filters, 100);
+            bench.print(format_args!("tick/{program}/map-{filter}"), worst.tick);
+            bench.print(format_args!("changing-line/{program}/{filter}"), worst.line);
+        }
+    }
+}
+
+#[inline(never)]
+fn link(bench: &mut Bench, filters: &mut DelayLines) {
     let (_, half_millimetres) = PROGRAMS[2];
     let served = bench.serve(&robot(Kind::FirZvd, 6.34), half_millimetres, filters);
     bench.print(format_args!("link/line"), served.line_mean);
     bench.print(format_args!("link/status"), served.status);
     bench.overlap();
+}
+
+#[inline(never)]
+fn corners(bench: &mut Bench) {
     for kind in Kind::ALL {
         let worst = bench.corners(&robot(kind, 6.34));
         bench.print(format_args!("corner/{}", kind.name()), worst);
     }
-    bench.end()
 }
 
+/// A mode of 9 Hz at the near end of the corner path and 15 Hz at its far end.
+#[inline(never)]
+fn robot_with_map(kind: Kind) -> Robot {
+    let mut config = config(kind, 10.0);
+    config.map = ModeMapConfig {
+        x_mm: [180.0, 315.0],
+        columns: 2,
+        rows: 1,
+        ..ModeMapConfig::NONE
+    };
+    config.map.nodes[0] = MapNode::new(9.0, 0.022);
+    config.map.nodes[1] = MapNode::new(15.0, 0.022);
+    defmt::unwrap!(Robot::new(&config).ok(), "the settings are within range")
+}
+
+#[inline(never)]
 fn robot(kind: Kind, frequency_hz: f32) -> Robot {
-    robot_of(ArmKind::Scara, kind, frequency_hz)
+fn robot(kind: Kind, frequency_hz: f32) -> Robot {
+    robot_of(config(kind, frequency_hz))
 }
 
+#[inline(never)]
 fn delta(kind: Kind, frequency_hz: f32) -> Robot {
-    robot_of(ArmKind::Delta, kind, frequency_hz)
+    robot_of(RobotConfig {
+        arm: ArmKind::Delta,
+        ..config(kind, frequency_hz)
+    })
 }
 
-fn robot_of(arm: ArmKind, kind: Kind, frequency_hz: f32) -> Robot {
-    let config = RobotConfig {
-        arm,
+fn robot_of(config: RobotConfig) -> Robot {
+    defmt::unwrap!(Robot::new(&config).ok(), "the settings are within range")
+}
+
+fn config(kind: Kind, frequency_hz: f32) -> RobotConfig {
+    RobotConfig {
         prefilter: PrefilterConfig {
             kind,
             frequency_hz,
@@ -135,8 +192,7 @@ fn robot_of(arm: ArmKind, kind: Kind, frequency_hz: f32) -> Robot {
             ..PrefilterConfig::default()
         },
         ..RobotConfig::default()
-    };
-    defmt::unwrap!(Robot::new(&config).ok(), "the settings are within range")
+    }
 }
 
 /// A pick and place of a delta.
@@ -195,6 +251,7 @@ impl Bench {
     }
 
     /// Ticks and lines of a program at a feed override.
+    #[inline(never)]
     fn run(
         &self,
         robot: &Robot,
@@ -262,6 +319,7 @@ impl Bench {
 
     /// Sends a program byte by byte through the controller, and asks for the status now and
     /// then.
+    #[inline(never)]
     fn serve(&self, robot: &Robot, program: &str, filters: &mut DelayLines) -> Served {
         let mut queue = SegmentQueue::new();
         let (producer, consumer) = queue.split();

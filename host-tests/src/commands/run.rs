@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use planner_core::config::Robot;
 use planner_core::prefilter::Kind;
 
 use super::output::{Figure, figures, write_files};
@@ -64,6 +65,9 @@ pub fn execute(args: &RunArgs) -> Result<String> {
         return run.summary.json();
     }
     let mut lines = vec![headline(&run.summary)];
+    if let Some(follower) = Robot::new(&scenario.settings.robot)?.follower {
+        lines.push(format!("  {:22} {follower}", "prefilters"));
+    }
     for Figure { name, value } in figures(&run.summary) {
         lines.push(format!("  {name:22} {value}"));
     }

@@ -91,6 +91,32 @@ fn the_tick_costs_the_same_whatever_the_filters_length_and_the_segments() {
     assert!(counts["tick/arcs/fir-zvd"] <= 2500, "{counts:?}");
 }
 
+/// Two filters of three stages each while the prefilter changes, and the kernels' way between
+/// planner and tick.
+#[test]
+fn the_tick_stays_below_2500_instructions_while_the_prefilter_changes() {
+    let Some(counts) = counts() else { return };
+    for program in ["corner-path", "arcs", "half-millimetres"] {
+        for filter in ["map-fir-zvd", "map-ei"] {
+            let tick = counts[&format!("tick/{program}/{filter}")];
+            println!("{program}, {filter}: {tick}");
+            assert!((500..=2500).contains(&tick), "{program}, {filter}: {tick}");
+        }
+    }
+}
+
+/// Such a line is a move that lasts longer than its prefilter, 0.1 s and more.
+#[test]
+fn a_line_that_changes_the_prefilter_is_planned_within_two_milliseconds() {
+    let Some(counts) = counts() else { return };
+    for (name, count) in counts {
+        if name.starts_with("changing-line/") {
+            println!("{name}: {count}");
+            assert!(count * 500 <= INSTRUCTIONS_S, "{name}: {count}");
+        }
+    }
+}
+
 #[test]
 fn a_deltas_tick_stays_below_2500_instructions() {
     let Some(counts) = counts() else { return };

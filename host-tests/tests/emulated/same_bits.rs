@@ -20,6 +20,7 @@ use planner_core::config::{Robot, RobotConfig};
 use planner_core::kinematics::Elbow;
 use planner_core::motion::{DelayLines, MotionState, Setpoint};
 use planner_core::pose::Joint3;
+use planner_core::posture::{MapNode, ModeMapConfig, PostureMethod};
 use planner_core::prefilter::Kind;
 use planner_core::queue::{LOOKAHEAD, SegmentQueue};
 use planner_core::units::{AngleDeg, AngleRad, LengthMm};
@@ -323,6 +324,36 @@ fn every_word_has_the_same_bits() {
         config.prefilter.kind = kind;
         if ticks_alike(&config, EVERY_WORD).is_none() {
             return;
+        }
+    }
+}
+
+/// Changes of the prefilter on the way and at rest, corners between them, and an arc.
+#[test]
+fn a_program_with_a_map_has_the_same_bits() {
+    for (kind, method) in [
+        (Kind::FirZvd, PostureMethod::Local),
+        (Kind::Zv, PostureMethod::Local),
+        (Kind::Fir, PostureMethod::Hybrid),
+    ] {
+        let mut config = RobotConfig::default();
+        config.prefilter.kind = kind;
+        config.posture_method = method;
+        config.map = ModeMapConfig {
+            x_mm: [180.0, 315.0],
+            y_mm: [-120.0, 140.0],
+            columns: 2,
+            rows: 2,
+            ..ModeMapConfig::NONE
+        };
+        for (node, hz) in config.map.nodes.iter_mut().zip([9.0, 14.3, 11.0, 15.6]) {
+            *node = MapNode::new(hz, 0.022);
+        }
+        for program in [CORNER_PATH, EVERY_WORD] {
+            let Some(ticks) = ticks_alike(&config, program) else {
+                return;
+            };
+            println!("{kind:?}, {method:?}: {ticks} ticks are the same on both");
         }
     }
 }

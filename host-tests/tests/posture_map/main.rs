@@ -1,4 +1,5 @@
 //! Programs on a robot whose mode depends on the posture, and which has a map of it.
 
 mod promises;
+mod residual;
 mod support;

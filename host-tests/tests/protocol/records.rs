@@ -61,3 +61,54 @@ fn damaged_records_are_passed_over() {
         assert!(heard[3].ends_with("ok\r\n"), "{heard:?}");
     }
 }
+
+#[test]
+fn a_map_is_given_line_by_line_and_comes_back() {
+    let lines = [
+        "$map=2,2,100,320,-140,140",
+        "$map1=16/0.02,8.5/0.03",
+        "$map",
+        "$map2=15.75/0.02,8/0.02",
+        "$map3=1/0",
+        "$map1=500/0.02,8/0.02",
+        "G0 X250 Y0",
+        "G1 X300 F6000",
+        "M100 Q5",
+        "M100 P1",
+    ];
+    let (records, heard) = session(Records::new(), &lines);
+    assert!(heard[3].contains("[MSG:The map is in force when all its rows are given]"));
+    for (answer, part) in heard[1..].iter().zip([
+        "ok",
+        "ok",
+        "$map1=16.000/0.02000,8.500/0.03000",
+        "ok",
+        "error:",
+        "error:",
+        "ok",
+        "ok",
+        "error:76",
+        "ok",
+    ]) {
+        assert!(answer.contains(part), "{part}: {heard:?}");
+    }
+    let (_, heard) = session(records.clone(), &["$map", "$map=0", "$map"]);
+    assert!(heard[1].contains("$map=2,2,100,320,-140,140"), "{heard:?}");
+    assert!(
+        heard[1].contains("$map2=15.750/0.02000,8.000/0.02000"),
+        "{heard:?}"
+    );
+    assert!(
+        heard[1].contains("[MSG:fir-zvd made for the mode where"),
+        "{heard:?}"
+    );
+    assert!(
+        heard[3].contains("$map=0") && !heard[3].contains("MSG"),
+        "{heard:?}"
+    );
+    let (_, heard) = session(records, &["$automatic=1 residual-limit=0.05", "$map"]);
+    assert!(
+        heard[2].contains("shortest whose residual stays below 5 % of a mode known to 5 %"),
+        "{heard:?}"
+    );
+}

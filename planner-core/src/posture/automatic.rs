@@ -367,6 +367,27 @@ impl Shortest {
     }
 }
 
+impl fmt::Display for Shortest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}: shortest whose residual stays below {} % of a mode known to {} %",
+            self.kind(0.0).name(),
+            Percent(self.config.limit.into()),
+            Percent(self.config.uncertainty.into()),
+        )?;
+        // longer ones, for moves that keep one prefilter while the mode changes
+        let mut furthest = 0.0;
+        for (kind, reach) in &self.reach {
+            if *reach > furthest && *reach >= self.config.uncertainty {
+                furthest = *reach;
+                write!(f, "; {} to {:.1} %", kind.name(), 100.0 * reach)?;
+            }
+        }
+        Ok(())
+    }
+}
+
 /// How far the mode may be off, as a fraction, for no more than `limit` to be left of it: good
 /// to 0.03 %, and never too much but by what the residual does within a percent.
 fn reach(kind: Kind, nominal: &Mode, limit: f64) -> f64 {

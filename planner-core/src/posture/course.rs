@@ -30,11 +30,13 @@ impl Course {
     /// The mode after so much of the way; beyond an end it is that end's.
     #[must_use]
     pub fn mode_at(&self, travelled_mm: f64) -> Mode {
-        between(
-            self.start,
-            self.end,
-            (travelled_mm / self.length_mm).clamp(0.0, 1.0),
-        )
+        // a move that only turns stays where it is
+        let part = if self.length_mm > 0.0 {
+            (travelled_mm / self.length_mm).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        between(self.start, self.end, part)
     }
 
     /// What the acceleration meets.

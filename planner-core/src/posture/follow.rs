@@ -9,7 +9,7 @@ use super::method::Method;
 use super::zeros::Zeros;
 use crate::path::PathSegment;
 use crate::prefilter::{
-    HALF_SLOTS, Kernel, Kind, Mode, Prefilter, PrefilterConfig, PrefilterError,
+    HALF_SLOTS, Kernel, Kind, Mode, Prefilter, PrefilterConfig, PrefilterError, Stage,
 };
 use crate::units::TICK_S;
 
@@ -156,8 +156,8 @@ impl core::error::Error for FollowError {}
 /// What a follower makes prefilters of.
 #[derive(Clone, Debug)]
 enum Source {
-    Named(Kind),
-    Shortest(Shortest),
+    Named(PrefilterConfig),
+    Shortest(Shortest, PrefilterConfig),
     Boxes(PostureMethod),
 }
 
@@ -166,8 +166,8 @@ enum Source {
 pub struct FollowConfig<'a> {
     /// The map.
     pub map: &'a ModeMapConfig,
-    /// The named prefilter.
-    pub kind: Kind,
+    /// The named prefilter; its mode is the map's.
+    pub prefilter: PrefilterConfig,
     /// Whether the shortest prefilter is to be chosen instead.
     pub shortest: Option<ShortestConfig>,
     /// What prefilters are made from.
@@ -186,7 +186,7 @@ pub struct ShortestConfig {
 /// Chooses the prefilters of each move by the map.
 ///
 /// A move accelerates through a prefilter for the mode at its start and decelerates through one
-/// for the mode at its end. Where one follows the other without a stop, both sides of the
+/// for the mode at its end, each for the mean of what the phase meets. Where one follows the other without a stop, both sides of the
 /// corner share the prefilter for that place. A move too short to change on its way keeps one
 /// prefilter: from rest that for its middle, which is off by half of the change at both ends;
 /// within a path the one in force.
@@ -208,11 +208,11 @@ impl Follower {
     pub fn new(config: &FollowConfig<'_>) -> Result<Self, FollowError> {
         let map = ModeMap::new(config.map).map_err(FollowError::Map)?;
         let source = match (config.method, config.shortest) {
-            (PostureMethod::Local, None) => Source::Named(config.kind),
+            (PostureMethod::Local, None) => Source::Named(config.prefilter),
             (PostureMethod::Local, Some(shortest)) => {
-                let modes = config.map.used().iter().map(|node| Mode::from(node));
+                let modes = config.map.used().iter().map(Mode::from);
                 let found = Shortest::new(modes, &shortest).map_err(FollowError::Shortest)?;
-                Source::Shortest(found)
+                Source::Shortest(found, config.prefilter)
             }
             (method, _) => Source::Boxes(method),
         };
@@ -233,8 +233,10 @@ impl Follower {
     pub fn slowest(&self) -> Tuning {
         let mode = self.map.slowest();
         match &self.source {
-            Source::Named(kind) => named(*kind, &mode),
-            Source::Shortest(shortest) => named(shortest.longest(), &mode),
+            Source::Named(config) => named(config, &mode),
+            Source::Shortest(shortest, config) => {
+                named(&of_kind(config, shortest.longest()), &mode)
+            }
             Source::Boxes(_) => Tuning::Boxes([mode.frequency_hz; 2]),
         }
     }
@@ -266,12 +268,10 @@ impl Follower {
 
     /// What suits both ends.
     fn ends(&self, step: &MoveToFollow) -> (Tuning, Tuning) {
-        let course = &step.course;
         match &self.source {
-            Source::Named(kind) => (named(*kind, &course.start), named(*kind, &course.end)),
-            Source::Shortest(shortest) => {
-                let kind = shortest.kind(0.0);
-                (named(kind, &course.start), named(kind, &course.end))
+            Source::Named(config) => both_ends(config, step),
+            Source::Shortest(shortest, config) => {
+                both_ends(&of_kind(config, shortest.kind(0.0)), step)
             }
             Source::Boxes(method) => profile(*method, step),
         }
@@ -282,12 +282,31 @@ impl Follower {
         let course = &step.course;
         let mode = between(course.start, course.end, 0.5);
         match &self.source {
-            Source::Named(kind) => named(*kind, &mode),
-            Source::Shortest(shortest) => {
+            Source::Named(config) => named(config, &mode),
+            Source::Shortest(shortest, config) => {
                 let off = libm::fabs(course.start.frequency_hz / mode.frequency_hz - 1.0);
-                named(shortest.kind(off), &mode)
+                named(&of_kind(config, shortest.kind(off)), &mode)
             }
             Source::Boxes(_) => Tuning::Boxes([mode.frequency_hz; 2]),
+        }
+    }
+}
+
+impl fmt::Display for Follower {
+    /// Which prefilters, and why.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.source {
+            Source::Named(config) => write!(
+                f,
+                "{} made for the mode where each move starts and ends",
+                config.kind.name()
+            ),
+            Source::Shortest(shortest, _) => shortest.fmt(f),
+            Source::Boxes(method) => write!(
+                f,
+                "two boxes for each phase of a move, by method {}",
+                method.name()
+            ),
         }
     }
 }
@@ -322,13 +341,65 @@ fn profile(method: PostureMethod, step: &MoveToFollow) -> (Tuning, Tuning) {
     )
 }
 
-fn named(kind: Kind, mode: &Mode) -> Tuning {
+/// Prefilters for what the mode is, on average in time, while a move accelerates from rest and
+/// while it decelerates to rest.
+///
+/// From rest through a prefilter of length `T` and variance `σ²` the mean distance from the
+/// rest end is
+///
+/// ```text
+/// (1/T) ∫ F I(t) dt = F ((T − m)² + σ²) / (2T) ≈ F (T/8 + σ²/(2T))
+/// ```
+/// and the mode turns by as much as if it were that of there all the time.
+fn both_ends(config: &PrefilterConfig, step: &MoveToFollow) -> (Tuning, Tuning) {
+    let course = &step.course;
+    let feed_mm_s = course.length_mm / step.duration_s;
+    let met = |mode_after: &dyn Fn(f64) -> Mode| {
+        let mut tuning = named(config, &mode_after(0.0));
+        for _ in 0..2 {
+            let way_s = tuning.prefilter().map_or(0.0, |it| mean_way_s(&it));
+            tuning = named(config, &mode_after(feed_mm_s * way_s));
+        }
+        tuning
+    };
+    (
+        met(&|way_mm| course.mode_at(way_mm)),
+        met(&|way_mm| course.mode_at(course.length_mm - way_mm)),
+    )
+}
+
+/// `T/8 + σ²/(2T)`, with the variance of symmetric stages.
+fn mean_way_s(prefilter: &Prefilter) -> f64 {
+    let length_s = prefilter.length_s();
+    let variance = |stage: &Stage| {
+        let stage_s = stage.length_s();
+        let share = match stage {
+            Stage::Box(_) => 12.0,
+            Stage::Zv(_) => 4.0,
+            Stage::Impulses(_) => 8.0,
+        };
+        stage_s * stage_s / share
+    };
+    let variance: f64 = prefilter.stages().iter().map(variance).sum();
+    if length_s > 0.0 {
+        length_s / 8.0 + variance / (2.0 * length_s)
+    } else {
+        0.0
+    }
+}
+
+/// The same prefilter for another mode.
+fn named(config: &PrefilterConfig, mode: &Mode) -> Tuning {
     Tuning::Named(PrefilterConfig {
-        kind,
         frequency_hz: mode.frequency_hz as f32,
         damping: mode.damping as f32,
-        ..PrefilterConfig::DEFAULT
+        ..*config
     })
+}
+
+/// The same settings with another kind.
+fn of_kind(config: &PrefilterConfig, kind: Kind) -> PrefilterConfig {
+    PrefilterConfig { kind, ..*config }
 }
 
 /// How long a raw path has to be for the change between two prefilters on its way: both windows

@@ -111,6 +111,12 @@ impl ModeMapConfig {
         self.columns > 0
     }
 
+    /// Whether there is a map and all its modes are given; before, it is not in force.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.is_some() && self.used().iter().all(|node| node.frequency > 0)
+    }
+
     /// The nodes that count.
     #[must_use]
     pub fn used(&self) -> &[MapNode] {

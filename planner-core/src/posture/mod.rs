@@ -15,6 +15,7 @@ mod automatic;
 mod course;
 mod follow;
 mod map;
+mod map_text;
 mod method;
 mod profile;
 mod ramp;
@@ -27,6 +28,7 @@ pub use follow::{
     Tuning,
 };
 pub use map::{MAP_NODES, MapError, MapNode, ModeMap, ModeMapConfig};
+pub use map_text::{MAP_BYTES, MapLine};
 pub use method::{Method, MethodChoice, Reason};
 pub use profile::{Profile, ProfileError, ProfileState};
 pub use ramp::RawRamp;

@@ -6,31 +6,11 @@ use super::kernel::{HALF_SLOTS, Kernel, SLOTS, Shape, Tap, WEIGHT_BITS};
 /// The output has this many bits below the input's.
 pub const FINE_BITS: u32 = 13;
 
-/// Where a filter's samples lie in a delay line that it may share with another one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Part {
-    first: usize,
-    mask: usize,
-}
-
-impl Part {
-    const WHOLE: Self = Self {
-        first: 0,
-        mask: SLOTS - 1,
-    };
-
-    /// The first or the second half.
-    const fn half(which: usize) -> Self {
-        Self {
-            first: (which & 1) * HALF_SLOTS,
-            mask: HALF_SLOTS - 1,
-        }
-    }
-
-    /// A place in the line; the last remainder only tells the compiler what holds anyway.
-    const fn slot(self, at: usize) -> usize {
-        (self.first | (at & self.mask)) % SLOTS
-    }
+/// A place in the part of a delay line that a filter has: `USED` slots from slot `FIRST` on. Both
+/// are known when it is compiled, because they cost in each tap; the last remainder only tells
+/// the compiler what holds anyway.
+const fn slot<const FIRST: usize, const USED: usize>(at: usize) -> usize {
+    (FIRST + at % USED) % SLOTS
 }
 
 /// The samples of a delay line, a slot a tick.
@@ -76,7 +56,7 @@ impl<const AXES: usize> Convolver<AXES> {
     #[must_use]
     pub fn process(&mut self, kernel: &Kernel, input: [i32; AXES]) -> [i64; AXES] {
         self.filter
-            .process(&mut self.line, Part::WHOLE, kernel, input)
+            .process::<0, SLOTS>(&mut self.line, kernel, input)
     }
 }
 
@@ -125,14 +105,16 @@ impl<const AXES: usize> ConvolverPair<AXES> {
 
     /// As [`Convolver::process`], of the first (`false`) or the second one.
     #[must_use]
+    #[inline(always)]
     pub fn process(&mut self, second: bool, kernel: &Kernel, input: [i32; AXES]) -> [i64; AXES] {
-        let which = usize::from(second);
-        let part = if self.is_shared {
-            Part::half(which)
-        } else {
-            Part::WHOLE
-        };
-        self.filters[which].process(&mut self.line, part, kernel, input)
+        let line = &mut self.line;
+        let [one, other] = &mut self.filters;
+        match (self.is_shared, second) {
+            (false, false) => one.process::<0, SLOTS>(line, kernel, input),
+            (true, false) => one.process::<0, HALF_SLOTS>(line, kernel, input),
+            // the second one is not in use where there is no room for it
+            (_, true) => other.process::<HALF_SLOTS, HALF_SLOTS>(line, kernel, input),
+        }
     }
 }
 
@@ -165,10 +147,10 @@ impl<const AXES: usize> Filter<AXES> {
         self.sums = [rest.map(|value| i64::from(value) << WEIGHT_BITS); MAX_STAGES];
     }
 
-    fn process(
+    #[inline(never)]
+    fn process<const FIRST: usize, const USED: usize>(
         &mut self,
         line: &mut Line<AXES>,
-        part: Part,
         kernel: &Kernel,
         input: [i32; AXES],
     ) -> [i64; AXES] {
@@ -176,11 +158,11 @@ impl<const AXES: usize> Filter<AXES> {
         let mut total = input.map(|value| i64::from(value) << WEIGHT_BITS);
         let mut taps = kernel.taps.as_slice();
         for (stage, sums) in kernel.stages.iter().zip(&mut self.sums) {
-            let newest = part.slot(self.head.wrapping_add(usize::from(stage.first_slot)));
-            line[newest] = total.map(|value| round_off(value, WEIGHT_BITS) as i32);
-            let delayed = Delayed {
+            let newest = self.head.wrapping_add(usize::from(stage.first_slot));
+            line[slot::<FIRST, USED>(newest)] =
+                total.map(|value| round_off(value, WEIGHT_BITS) as i32);
+            let delayed = Delayed::<AXES, FIRST, USED> {
                 line,
-                part,
                 head: self.head,
                 age: self.age,
                 rest: &self.rest,
@@ -202,16 +184,16 @@ impl<const AXES: usize> Filter<AXES> {
 }
 
 /// The delay line as a stage reads it.
-struct Delayed<'a, const AXES: usize> {
+struct Delayed<'a, const AXES: usize, const FIRST: usize, const USED: usize> {
     line: &'a Line<AXES>,
-    part: Part,
     head: usize,
     age: usize,
     rest: &'a [i32; AXES],
 }
 
-impl<const AXES: usize> Delayed<'_, AXES> {
+impl<const AXES: usize, const FIRST: usize, const USED: usize> Delayed<'_, AXES, FIRST, USED> {
     /// `sum` and the samples weighted by the next taps, in 2^-30 of the input's unit.
+    #[inline(always)]
     fn weighted<const TAPS: usize>(&self, left: &mut &[Tap], mut sum: [i64; AXES]) -> [i64; AXES] {
         let Some((taps, others)) = left.split_first_chunk::<TAPS>() else {
             return sum;
@@ -220,9 +202,8 @@ impl<const AXES: usize> Delayed<'_, AXES> {
         let samples: [&[i32; AXES]; TAPS] = core::array::from_fn(|i| {
             let tap = &taps[i];
             if usize::from(tap.delay) <= self.age {
-                &self.line[self
-                    .part
-                    .slot(self.head.wrapping_add(usize::from(tap.slot)))]
+                let at = self.head.wrapping_add(usize::from(tap.slot));
+                &self.line[slot::<FIRST, USED>(at)]
             } else {
                 self.rest
             }

@@ -8,6 +8,7 @@ use crate::joint_space::Space;
 use crate::motion::{MotionState, Order};
 use crate::planner::{LineError, Planner};
 use crate::pose::{JointPosition, Pose};
+use crate::posture::ModeMapConfig;
 
 use super::alarm::Alarm;
 use super::cycle_start::CycleStart;
@@ -358,6 +359,7 @@ impl<'q> Controller<'q> {
         let reply = self.reply.as_mut()?;
         reply.next(&reply::Known {
             settings: &self.settings,
+            robot: self.planner.robot(),
             interpreter: self.planner.interpreter(),
             startup_lines: &self.startup_lines,
             build_name: &self.build_name,
@@ -979,6 +981,7 @@ impl Controller<'_> {
             Dollar::Help => self.reply(Topic::Help),
             Dollar::Settings if !at_rest => self.refuse(Refusal::NotIdle),
             Dollar::Settings => self.reply(Topic::Settings),
+            Dollar::Show(key) if key.eq_ignore_ascii_case("map") => self.reply(Topic::Map),
             Dollar::Show(key) => match Setting::find(key) {
                 Some(setting) => self.reply(Topic::Setting(setting)),
                 None => self.refuse(Refusal::BadDollar),
@@ -1082,8 +1085,12 @@ impl Controller<'_> {
         if protocol.soft_limit_alarm && !protocol.encoders {
             return self.refuse(Refusal::SoftLimitsNeedPosition);
         }
+        let changes_map = settings.robot.map != self.settings.robot.map;
         if self.adopt(&settings) {
             self.out(Out::Keep(Record::Settings));
+            if changes_map {
+                self.out(Out::Keep(Record::Map));
+            }
             self.accept();
         }
     }
@@ -1141,13 +1148,14 @@ impl Controller<'_> {
                 }
             }
             Record::BuildName => self.build_name = text,
-            Record::Settings | Record::Offsets => {}
+            Record::Settings | Record::Map | Record::Offsets => {}
         }
     }
 
     fn restore_defaults(&mut self, restore: Restore) {
         if matches!(restore, Restore::Settings | Restore::All) && self.adopt(&Settings::default()) {
             self.out(Out::Keep(Record::Settings));
+            self.out(Out::Keep(Record::Map));
         }
         if matches!(restore, Restore::Offsets | Restore::All) {
             self.planner.set_offsets(Offsets::NONE);
@@ -1247,10 +1255,13 @@ impl Controller<'_> {
         match record {
             Record::Settings => {
                 let settings = Settings::from_bytes(bytes);
-                if Robot::new(&settings.robot).is_ok() {
-                    self.adopt(&settings);
-                } else {
-                    self.store_was_damaged();
+                self.adopt_kept(&settings);
+            }
+            Record::Map => {
+                if let Some(map) = ModeMapConfig::from_bytes(bytes) {
+                    let mut settings = self.settings;
+                    settings.robot.map = map;
+                    self.adopt_kept(&settings);
                 }
             }
             Record::Offsets => {
@@ -1268,10 +1279,19 @@ impl Controller<'_> {
         }
     }
 
+    fn adopt_kept(&mut self, settings: &Settings) {
+        if Robot::new(&settings.robot).is_ok() {
+            self.adopt(settings);
+        } else {
+            self.store_was_damaged();
+        }
+    }
+
     /// What to keep of a record, written into `buffer`.
     pub fn record<'b>(&self, record: Record, buffer: &'b mut [u8; RECORD_BYTES]) -> &'b [u8] {
         match record {
             Record::Settings => copied(buffer, &self.settings.to_bytes()),
+            Record::Map => copied(buffer, &self.settings.robot.map.to_bytes()),
             Record::Offsets => copied(buffer, &self.planner.interpreter().offsets().to_bytes()),
             Record::StartupLine(line) => {
                 let text = self.startup_lines.get(usize::from(line));

@@ -1,6 +1,7 @@
 //! What is kept over a restart.
 
 use crate::gcode::Offsets;
+use crate::posture::MAP_BYTES;
 
 use super::settings::SETTINGS_BYTES;
 
@@ -9,6 +10,8 @@ use super::settings::SETTINGS_BYTES;
 pub enum Record {
     /// All settings.
     Settings,
+    /// The map of the mode.
+    Map,
     /// Work offsets and stored positions.
     Offsets,
     /// Start-up line 0 or 1.
@@ -28,10 +31,13 @@ pub const RECORD_BYTES: usize = 640;
 
 const _: () = assert!(SETTINGS_BYTES <= RECORD_BYTES && Offsets::BYTES <= RECORD_BYTES);
 
+const _: () = assert!(MAP_BYTES <= RECORD_BYTES);
+
 impl Record {
-    /// Every record there is.
-    pub const ALL: [Self; 5] = [
+    /// Every record there is; the map goes with settings that come before it.
+    pub const ALL: [Self; 6] = [
         Self::Settings,
+        Self::Map,
         Self::Offsets,
         Self::StartupLine(0),
         Self::StartupLine(1),

@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use crate::config::Robot;
 use crate::gcode::{Interpreter, Offsets};
 use crate::pose::Pose;
 
@@ -32,6 +33,8 @@ pub enum Topic {
     Settings,
     /// One setting.
     Setting(&'static Setting),
+    /// The map of the mode, and which prefilters follow it.
+    Map,
     /// Work offsets and stored positions.
     Offsets,
     /// The modal state.
@@ -51,6 +54,8 @@ pub enum Topic {
 pub struct Known<'a> {
     /// The settings in force.
     pub settings: &'a Settings,
+    /// The robot that planning uses.
+    pub robot: &'a Robot,
     /// Modal state, work offsets and stored positions.
     pub interpreter: &'a Interpreter,
     /// Start-up lines 0 and 1.
@@ -81,6 +86,7 @@ impl Reply {
             ),
             Topic::Settings => SETTINGS.get(line).map(|setting| known.setting(setting)),
             Topic::Setting(setting) => (line == 0).then(|| known.setting(setting)),
+            Topic::Map => known.map(line),
             Topic::Offsets => known.offset(line),
             Topic::ParserState => (line == 0).then(|| {
                 let state = known.interpreter.parser_state();
@@ -128,6 +134,24 @@ impl Known<'_> {
     fn setting(&self, setting: &Setting) -> Text {
         let value = self.settings.value(setting);
         Text::line(format_args!("${}={value}", setting.number))
+    }
+
+    /// The lines that set the map, and a message about the prefilters that follow it.
+    fn map(&self, line: usize) -> Option<Text> {
+        let map = &self.settings.robot.map;
+        if let Some(part) = map.line(line) {
+            return Some(Text::line(format_args!("${part}")));
+        }
+        if line != usize::from(map.rows) + 1 {
+            return None;
+        }
+        Some(match &self.robot.follower {
+            Some(follower) => Text::line(format_args!("[MSG:{follower}]")),
+            None if map.is_some() => Text::line(format_args!(
+                "[MSG:The map is in force when all its rows are given]"
+            )),
+            None => return None,
+        })
     }
 
     /// `[G54:…]` to `[G59:…]`, `[G28:…]`, `[G30:…]`, `[G92:…]`, `[TLO:…]`, `[PRB:…]`.

@@ -10,6 +10,7 @@ use super::homing::HomingConfig;
 use super::report::Inputs;
 use crate::config::{RobotConfig, SettingError, SettingValue};
 use crate::hop::HopAxes;
+use crate::posture::PostureMethod;
 use crate::prefilter::Kind as Prefilter;
 
 /// How the controller deals with its sender and its inputs.
@@ -141,6 +142,15 @@ const JOINTS: &[&str] = &["Joint 1", "Joint 2", "Joint 3", "Joint 4"];
 const INPUTS: &[&str] = &["Joint 1", "Joint 2", "Joint 3", "Joint 4", "Door"];
 const ELBOWS: &[&str] = &["left", "right"];
 const ROBOTS: &[&str] = &["scara", "delta"];
+const METHODS: &[&str] = &{
+    let mut names = [""; PostureMethod::ALL.len()];
+    let mut i = 0;
+    while i < names.len() {
+        names[i] = PostureMethod::ALL[i].name();
+        i += 1;
+    }
+    names
+};
 const PREFILTERS: &[&str] = &{
     let mut names = [""; Prefilter::ALL.len()];
     let mut i = 0;
@@ -162,7 +172,7 @@ const HOP_AXES: &[&str] = &{
 };
 
 /// The table, by number.
-pub const SETTINGS: [Setting; 92] = [
+pub const SETTINGS: [Setting; 96] = [
     setting(
         5,
         "inputs-inverted",
@@ -742,6 +752,38 @@ pub const SETTINGS: [Setting; 92] = [
         decimal(0.01, 0.5),
     ),
     setting(
+        1130,
+        "posture-method",
+        MOTION,
+        "Prefilters that follow the map",
+        "",
+        Kind::Choice(METHODS),
+    ),
+    setting(
+        1131,
+        "automatic",
+        MOTION,
+        "Shortest prefilter for each move",
+        "",
+        Kind::Switch,
+    ),
+    setting(
+        1132,
+        "uncertainty",
+        MOTION,
+        "Uncertainty of the frequency",
+        "",
+        decimal(0.0, 0.5),
+    ),
+    setting(
+        1133,
+        "residual-limit",
+        MOTION,
+        "Residual vibration allowed",
+        "",
+        decimal(0.001, 1.0),
+    ),
+    setting(
         1200,
         "joint1-velocity",
         LIMITS,
@@ -972,7 +1014,8 @@ enum Place<'a> {
 }
 
 impl Settings {
-    /// Sets values from `key=value` texts between blanks, a key being a number or a name.
+    /// Sets values from `key=value` texts between blanks, a key being a number or a name, or
+    /// part of the map: see [`ModeMapConfig::set`](crate::posture::ModeMapConfig::set).
     /// Whether a robot can be made of them is checked when one is.
     ///
     /// # Errors
@@ -981,6 +1024,11 @@ impl Settings {
         let mut changed = *self;
         for pair in text.split_ascii_whitespace() {
             let (key, value) = pair.split_once('=').ok_or(SettingError::Value)?;
+            match changed.robot.set_map(key, value) {
+                Some(true) => continue,
+                Some(false) => return Err(SettingError::Value),
+                None => {}
+            }
             let setting = Setting::find(key).ok_or(SettingError::Unknown)?;
             changed.set(setting, setting.read(value).ok_or(SettingError::Value)?);
         }
