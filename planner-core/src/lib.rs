@@ -10,6 +10,7 @@ pub mod config;
 pub mod corner;
 pub mod gcode;
 pub mod hop;
+pub mod identify;
 pub mod joint_space;
 pub mod kinematics;
 pub mod limits;
