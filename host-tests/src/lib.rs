@@ -24,6 +24,7 @@ pub mod plant_config;
 pub mod program_file;
 pub mod progress;
 pub mod random_program;
+pub mod record_file;
 pub mod robot_file;
 pub mod scenario;
 pub mod sender;

@@ -101,7 +101,7 @@ pub fn identify(record: &mut Record) -> Result<Identified, Refusal> {
     };
     let residual = sqrt_f32(noise.squares / samples.len() as f32);
     let stands_out = total - noise.squares > SIGNIFICANT * noise.variance;
-    let is_clipped = (found.first()).is_some_and(|found| record.is_clipped(found.frequency_hz));
+    let is_clipped = (found.iter()).any(|found| record.is_clipped(found.frequency_hz));
     record.clear();
     if !stands_out {
         return Err(Refusal::OnlyNoise);
@@ -292,11 +292,13 @@ mod tests {
     #[test]
     fn cut_crests_are_refused_and_coarse_ones_are_not() {
         let clean = samples(1.5, 3.0, &[Swing(100.0, 6.34, 0.01, 1.0)]);
-        for range in [60.0, 80.0, 90.0] {
+        for range in [50.0, 60.0, 80.0, 90.0] {
             let cut: List<_> = clean
                 .iter()
                 .map(|sample| sample.clamp(-range, range))
                 .collect();
+            assert_eq!(identified(&cut), Err(Refusal::Clipped), "{range}");
+            let cut: List<_> = clean.iter().map(|sample| sample.min(range)).collect();
             assert_eq!(identified(&cut), Err(Refusal::Clipped), "{range}");
         }
         for step in [0.01, 0.1, 1.0, 5.0] {
