@@ -5,12 +5,12 @@
 use embassy_executor::Executor;
 use firmware::board::{
     self, Board, BoardArm, BoardFlash, BoardOutputs, BoardWatchdog, CommandIn, CommandOut, Counter,
-    SetpointOut, StackUse, Stopwatch, stack_use,
+    SampleIn, SetpointOut, StackUse, Stopwatch, stack_use,
 };
 use firmware::tasks::command::Commands;
 use firmware::tasks::control::Frames;
 use firmware::tasks::link::Link;
-use firmware::tasks::{command, control, setpoints};
+use firmware::tasks::{command, control, samples, setpoints};
 use planner_core::config::Robot;
 use planner_core::motion::{DelayLines, Motion};
 use planner_core::planner::Planner;
@@ -44,6 +44,7 @@ fn start() -> Commands<CommandIn, CommandOut, BoardFlash> {
         command_in,
         command_out,
         setpoint_out,
+        sample_in,
         outputs,
         arm,
         flash,
@@ -77,6 +78,7 @@ fn start() -> Commands<CommandIn, CommandOut, BoardFlash> {
         motion, link, frames, outputs, arm, stopwatch, watchdog
     )));
     setpoints.spawn(defmt::unwrap!(setpoint_task(frames, setpoint_out)));
+    setpoints.spawn(defmt::unwrap!(sample_task(link, sample_in)));
     Commands {
         input: command_in,
         output: command_out,
@@ -103,6 +105,11 @@ async fn control_task(
 #[embassy_executor::task]
 async fn setpoint_task(frames: &'static Frames, port: SetpointOut) {
     setpoints::run(frames, port).await
+}
+
+#[embassy_executor::task]
+async fn sample_task(link: &'static Link, port: SampleIn) {
+    samples::run(link, port).await
 }
 
 #[embassy_executor::task]

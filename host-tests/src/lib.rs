@@ -28,6 +28,7 @@ pub mod record_file;
 pub mod robot_file;
 pub mod scenario;
 pub mod sender;
+pub mod sensed_plant;
 pub mod serial_loop;
 pub mod setpoint_watch;
 pub mod software_loop;

@@ -4,6 +4,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod accelerometer;
 mod arcs;
 mod changeover;
 pub mod config;

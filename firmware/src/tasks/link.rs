@@ -6,7 +6,9 @@ use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
+use embassy_sync::mutex::{self, MutexGuard};
 use planner_core::config::Robot;
+use planner_core::identify::Listener;
 use planner_core::motion;
 use planner_core::protocol::Report;
 
@@ -29,6 +31,7 @@ pub struct Link {
     report: Mutex<CriticalSectionRawMutex, Cell<Report>>,
     program_open: AtomicBool,
     inputs_inverted: AtomicU8,
+    listener: mutex::Mutex<CriticalSectionRawMutex, Listener>,
 }
 
 type Orders = Channel<CriticalSectionRawMutex, Order, ORDERS>;
@@ -42,6 +45,7 @@ impl Default for Link {
             report: Mutex::new(Cell::default()),
             program_open: AtomicBool::new(false),
             inputs_inverted: AtomicU8::new(0),
+            listener: mutex::Mutex::new(Listener::new()),
         }
     }
 }
@@ -73,6 +77,12 @@ impl Link {
     /// Command task: the last tick's report.
     pub fn report(&self) -> Report {
         self.report.lock(Cell::get)
+    }
+
+    /// Sample task and command task: the accelerometer's record. While one has it the other
+    /// waits, and interrupts do not.
+    pub async fn listener(&self) -> MutexGuard<'_, CriticalSectionRawMutex, Listener> {
+        self.listener.lock().await
     }
 
     /// Control task: the next order, if there is one.

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use anyhow::{Context, Error, Result, anyhow};
 use clap::Args;
@@ -11,15 +12,48 @@ use planner_core::identify::{
 use serde::Serialize;
 
 use super::Failure;
+use crate::link::{Address, Connection, LinkError, codes};
 use crate::pictures;
 use crate::record_file::RecordFile;
+use crate::sender::{self, Session, SessionError};
+
+/// Exit status: the link could not be opened, or was lost.
+const LINK: u8 = 5;
+
+/// How long a move, a record and an identification may take.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Arguments of `identify`.
 #[derive(Args, Debug)]
+#[command(after_help = "\
+On a controller it moves the robot, records what the accelerometer on its second port sends in the \
+second after the stop, and identifies there. The way has to be clear. Start and stop both excite: \
+where nothing stands out, another length helps.
+
+Exit status: 0, 1 the record or the controller's answer is a refusal, 2 wrong use, 5 the link could \
+not be opened, was lost or silent.")]
 pub struct IdentifyArgs {
     /// Record of an acceleration after a stop: CSV with the columns time_s and
     /// acceleration_mm_s2, 0.25 s at the least; the first 2 s count.
-    file: PathBuf,
+    #[arg(required_unless_present = "on")]
+    file: Option<PathBuf>,
+    /// Controller that identifies instead: serial device, pseudo-terminal, or tcp:HOST:PORT.
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["file", "modes", "out"])]
+    on: Option<Address>,
+    /// The move that excites: axis words, relative, and a feedrate.
+    #[arg(
+        long = "move",
+        value_name = "WORDS",
+        default_value = "X40 F9600",
+        requires = "on"
+    )]
+    excite: String,
+    /// Make the mode that is found the prefilter's, and keep it.
+    #[arg(long, requires = "on")]
+    store: bool,
+    /// Speed of a serial device.
+    #[arg(long, value_name = "BAUD", default_value_t = 115_200, requires = "on")]
+    baud: u32,
     /// Modes to give: the one of the larger amplitude, or both if there are two.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
     modes: u8,
@@ -73,7 +107,11 @@ impl From<&IdentifiedMode> for Figures {
 /// # Errors
 /// A record that cannot be read or believed, in one sentence.
 pub fn execute(args: &IdentifyArgs) -> Result<String, Failure> {
-    let identification = Identification::of(&args.file, usize::from(args.modes))?;
+    if let Some(address) = &args.on {
+        return on_controller(args, address);
+    }
+    let file = args.file.as_deref().unwrap_or(Path::new(""));
+    let identification = Identification::of(file, usize::from(args.modes))?;
     let written = args
         .out
         .as_deref()
@@ -92,6 +130,64 @@ pub fn execute(args: &IdentifyArgs) -> Result<String, Failure> {
         text += &format!("\n\nLook at:\n  {}", path.display());
     }
     Ok(text)
+}
+
+/// Lets a controller identify; yields what it has to say.
+fn on_controller(args: &IdentifyArgs, address: &Address) -> Result<String, Failure> {
+    let link = |error: LinkError| Failure::new(LINK, error);
+    let connection = Connection::open(address, args.baud).map_err(link)?;
+    let mut session = Session::begin(connection, false).map_err(|error| match error {
+        SessionError::Link(error) => link(error),
+        error => Failure::from(Error::from(error)),
+    })?;
+    let line = format!("$ID={}", args.excite);
+    let answer = session.ask_patiently(&line, PATIENCE).map_err(link)?;
+    let info = accepted(address, &line, answer)?;
+    let said = info.iter().find_map(|line| line.strip_prefix("ID:"));
+    let values = said.map(|said| said.split(',').map(str::parse).collect());
+    let Some(Ok::<Vec<f32>, _>(values)) = values else {
+        return Err(anyhow!("{address}: the controller did not say what it found").into());
+    };
+    let [frequency_hz, damping, confidence] = values[..] else {
+        return Err(anyhow!("{address}: the controller did not say what it found").into());
+    };
+    if args.store {
+        let line = "$ID=store";
+        let answer = session.ask(line).map_err(link)?;
+        accepted(address, line, answer)?;
+    }
+    let largest = Figures {
+        frequency_hz,
+        damping,
+        confidence,
+    };
+    if args.json {
+        let modes = None;
+        let answer = Answer { largest, modes };
+        return Ok(serde_json::to_string(&answer).map_err(Error::from)?);
+    }
+    let stored = if args.store {
+        "The prefilter is made for it from now on."
+    } else {
+        "Store it with --store, or the line $ID=store."
+    };
+    Ok(format!(
+        "{frequency_hz} Hz, damping {damping}, confidence {confidence}\n{stored}"
+    ))
+}
+
+/// What was said with a line that was accepted, or the sentence of its refusal.
+fn accepted(address: &Address, line: &str, answer: sender::Answer) -> Result<Vec<String>> {
+    match answer.error {
+        None => Ok(answer.info),
+        Some(code) => {
+            let sentence = answer
+                .messages
+                .last()
+                .map_or_else(|| codes::error(code), String::as_str);
+            Err(anyhow!("{address}: {line} was refused: {sentence}"))
+        }
+    }
 }
 
 impl Identification {

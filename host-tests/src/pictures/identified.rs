@@ -43,7 +43,7 @@ pub fn draw(identification: &Identification) -> Result<String> {
     let spectra = [record, &fit].map(|samples| spectrum(samples, top_hz));
     let peak = spectra[0].iter().map(|point| point.1).fold(0.0, f64::max);
     let legend = [
-        full(COMMAND, 2, "recorded"),
+        full(COMMAND, 4, "recorded"),
         full(CONTRAST, 1, "fitted"),
         limit("natural frequency"),
     ];
@@ -58,7 +58,7 @@ pub fn draw(identification: &Identification) -> Result<String> {
         let (upper, lower) = body.split_vertically(height / 2);
         let ranges = [(0.0, end), (lowest - room, highest + room)];
         let mut chart = axes(&upper, ranges, ["time, s", "acceleration, mm/s²"], [10, 6])?;
-        lines(&mut chart, [record.to_vec()], COMMAND, 2)?;
+        lines(&mut chart, [record.to_vec()], COMMAND, 4)?;
         lines(&mut chart, [fit.clone()], CONTRAST, 1)?;
         let ranges = [(0.0, top_hz), (0.0, 1.2 * peak)];
         let mut chart = axes(
@@ -79,7 +79,7 @@ pub fn draw(identification: &Identification) -> Result<String> {
             )?;
         }
         let [recorded, fitted] = spectra.clone();
-        lines(&mut chart, [recorded], COMMAND, 2)?;
+        lines(&mut chart, [recorded], COMMAND, 4)?;
         lines(&mut chart, [fitted], CONTRAST, 1)
     })
 }

@@ -2,6 +2,7 @@
 //!
 //! | step | |
 //! |---|---|
+//! | [`Listener`] | takes an accelerometer's frames, from a certain tick on |
 //! | [`Record`] | thins the samples out as they arrive |
 //! | `scan` | finds where to begin, over windows of four lengths |
 //! | `decay` | fits one mode; what it leaves is scanned again, and two modes are fitted |
@@ -14,6 +15,7 @@
 //! estimate without prior knowledge beats.
 
 mod decay;
+mod listener;
 mod mode;
 mod noise;
 mod record;
@@ -26,6 +28,7 @@ use core::f32::consts::TAU;
 use heapless::Vec;
 
 pub use decay::{Complex, Decay};
+pub use listener::{LISTENING_S, Listen, Listener, Listening};
 pub use mode::{DAMPING_WITHIN, FREQUENCY_WITHIN, IdentifiedMode, LEAST_CONFIDENCE, MODES};
 pub use record::{CAPACITY, LONGEST_S, Record, SHORTEST_S};
 pub use refusal::Refusal;
@@ -181,7 +184,7 @@ mod tests {
             ratio in 1.25..2.2,
             second_damping in 3e-4..0.05,
             second in 0.1..0.5,
-            phases in [0.0..6.28, 0.0..6.28],
+            phases in [0.0..core::f64::consts::TAU, 0.0..core::f64::consts::TAU],
             unit in prop_oneof![Just(1e-3), Just(1.0), Just(1e5)],
             offset in -1.0..1.0,
             length_s in 1.0..2.0,

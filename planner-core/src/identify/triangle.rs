@@ -88,8 +88,9 @@ mod tests {
         for pivot in 0..COLUMNS {
             for row in pivot + 1..COLUMNS {
                 let factor = rows[row][pivot] / rows[pivot][pivot];
-                for column in pivot..COLUMNS {
-                    rows[row][column] -= factor * rows[pivot][column];
+                let above = rows[pivot];
+                for (value, above) in rows[row].iter_mut().zip(above) {
+                    *value -= factor * above;
                 }
                 right[row] -= factor * right[pivot];
             }
