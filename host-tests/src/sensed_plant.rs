@@ -25,7 +25,8 @@ pub struct SensedPlant {
     rng: ChaCha8Rng,
     /// Ticks that an answer takes.
     delay: usize,
-    under_way: VecDeque<SampleFrame>,
+    /// Answers with the ticks until they arrive.
+    under_way: VecDeque<(usize, SampleFrame)>,
     /// The tool's acceleration along X and Y in each tick since the last stop, in mm/s².
     felt_mm_s2: Vec<[f64; 2]>,
     was_moving: bool,
@@ -50,8 +51,7 @@ impl SensedPlant {
         }
     }
 
-    /// Carries out a setpoint; yields what the accelerometer sends then. Each setpoint has one
-    /// answer.
+    /// Carries out a setpoint; yields the answer of the accelerometer that arrives then.
     pub fn answer(&mut self, frame: &SetpointFrame) -> Option<SampleFrame> {
         let setpoint = &frame.setpoint;
         let position = joints(setpoint);
@@ -80,17 +80,23 @@ impl SensedPlant {
             let [x, y, _] = felt.tool_acceleration_mm_s2;
             self.felt_mm_s2.push([x, y]);
         }
-        let mut noisy = |value: f64| value + NOISE_MM_S2 * self.rng.random_range(-1.0..=1.0);
-        let acceleration_mm_s2 = felt
-            .tool_acceleration_mm_s2
-            .map(|value| noisy(value) as f32);
-        self.under_way.push_back(SampleFrame {
-            sequence: frame.sequence,
-            acceleration_mm_s2,
-        });
-        (self.under_way.len() > self.delay)
-            .then(|| self.under_way.pop_front())
-            .flatten()
+        for (wait, _) in &mut self.under_way {
+            *wait = wait.saturating_sub(1);
+        }
+        if frame.listening {
+            let mut noisy = |value: f64| value + NOISE_MM_S2 * self.rng.random_range(-1.0..=1.0);
+            self.under_way.push_back((
+                self.delay,
+                SampleFrame {
+                    sequence: frame.sequence,
+                    acceleration_mm_s2: felt
+                        .tool_acceleration_mm_s2
+                        .map(|value| noisy(value) as f32),
+                },
+            ));
+        }
+        let (_, sample) = self.under_way.pop_front_if(|(wait, _)| *wait == 0)?;
+        Some(sample)
     }
 
     /// Ticks since the last stop, up to a minute of them.

@@ -205,6 +205,7 @@ impl SerialLoop<'_> {
             let frame = SetpointFrame {
                 sequence: self.report.health.ticks,
                 setpoint,
+                listening: self.listener.is_busy(),
                 ..SetpointFrame::default()
             };
             if let Some(sample) = plant.answer(&frame) {

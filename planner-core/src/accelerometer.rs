@@ -1,8 +1,9 @@
-//! The stream of acceleration samples: one frame for each setpoint frame, back to the controller.
+//! The stream of acceleration samples: one frame for each setpoint frame that wants one, back to
+//! the controller.
 //!
 //! The sensor's node hears the setpoints ([`crate::telemetry`]) on the line's other direction, and
-//! answers each frame with what the tool's acceleration is then. The setpoint's number comes
-//! back with it, so that it does not matter how long an answer takes.
+//! answers each frame that is marked so with what the tool's acceleration is then. The setpoint's
+//! number comes back with it, so that it does not matter how long an answer takes.
 //!
 //! A frame is 16 bytes, little endian, followed by their CRC-32 (ISO-HDLC), the whole COBS-coded
 //! and closed by a zero byte: 22 bytes on the wire.

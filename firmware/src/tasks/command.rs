@@ -48,8 +48,7 @@ pub async fn run<F: NorFlash<Error: Debug>>(commands: Commands<impl ByteIn, impl
         // A deadline that is now still takes what the port already has, so that a realtime
         // byte is heeded between any two steps.
         let mut wake = now;
-        let mut report = link.report();
-        report.listening = link.listener().await.progress();
+        let report = link.report().await;
         match controller.step(now.as_millis(), &report) {
             Step::Say(text) => output.write_all(text.as_bytes()).await,
             Step::Order(order) => link.order(order).await,

@@ -31,6 +31,7 @@ pub struct Link {
     report: Mutex<CriticalSectionRawMutex, Cell<Report>>,
     program_open: AtomicBool,
     inputs_inverted: AtomicU8,
+    listening: AtomicBool,
     listener: mutex::Mutex<CriticalSectionRawMutex, Listener>,
 }
 
@@ -45,6 +46,7 @@ impl Default for Link {
             report: Mutex::new(Cell::default()),
             program_open: AtomicBool::new(false),
             inputs_inverted: AtomicU8::new(0),
+            listening: AtomicBool::new(false),
             listener: mutex::Mutex::new(Listener::new()),
         }
     }
@@ -74,9 +76,14 @@ impl Link {
         self.inputs_inverted.store(bits, Ordering::Relaxed);
     }
 
-    /// Command task: the last tick's report.
-    pub fn report(&self) -> Report {
-        self.report.lock(Cell::get)
+    /// Command task: the last tick's report, with what the accelerometer has said so far.
+    pub async fn report(&self) -> Report {
+        let listener = self.listener().await;
+        self.listening.store(listener.is_busy(), Ordering::Relaxed);
+        Report {
+            listening: listener.progress(),
+            ..self.report.lock(Cell::get)
+        }
     }
 
     /// Sample task and command task: the accelerometer's record. While one has it the other
@@ -104,6 +111,11 @@ impl Link {
     /// Control task: see [`Link::set_inputs_inverted`].
     pub fn inputs_inverted(&self) -> u8 {
         self.inputs_inverted.load(Ordering::Relaxed)
+    }
+
+    /// Control task: whether the accelerometer's samples are wanted.
+    pub fn is_listening(&self) -> bool {
+        self.listening.load(Ordering::Relaxed)
     }
 
     /// Control task: tells about the tick.

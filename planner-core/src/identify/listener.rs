@@ -12,7 +12,7 @@ pub const LISTENING_S: f32 = 1.0;
 /// What to record.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Listen {
-    /// Number of the setpoint from whose answer on.
+    /// Number of the setpoint whose answer counts first, or a later one.
     pub from: u32,
     /// Direction of the component that counts, X, Y and Z.
     pub direction: [f32; 3],
@@ -24,8 +24,8 @@ pub enum Listening {
     /// Nothing is to be recorded.
     #[default]
     Idle,
-    /// Samples are awaited, or come.
-    Busy,
+    /// Samples are awaited, or come: so many have come.
+    Busy(u16),
     /// A sample was lost, so the record is none.
     Torn,
     /// The record is complete.
@@ -56,11 +56,17 @@ impl Listener {
         }
     }
 
+    /// Whether samples are wanted.
+    #[must_use]
+    pub const fn is_busy(&self) -> bool {
+        matches!(self.progress, Listening::Busy(_))
+    }
+
     /// Begins a record, instead of any other.
     pub fn listen(&mut self, listen: Listen) {
         self.record.clear();
         self.listen = listen;
-        self.progress = Listening::Busy;
+        self.progress = Listening::Busy(0);
     }
 
     /// How far the record has come.
@@ -79,19 +85,20 @@ impl Listener {
     }
 
     fn take(&mut self, frame: &SampleFrame) {
-        if self.progress != Listening::Busy {
+        let Listening::Busy(count) = self.progress else {
             return;
-        }
+        };
         let ahead = frame.sequence.wrapping_sub(self.listen.from);
         if ahead > u32::MAX / 2 {
             // an answer to a setpoint before the first one that counts
             return;
         }
-        if ahead > 0 {
+        if ahead > 0 && count > 0 {
             self.progress = Listening::Torn;
             return;
         }
-        self.listen.from = self.listen.from.wrapping_add(1);
+        self.listen.from = frame.sequence.wrapping_add(1);
+        self.progress = Listening::Busy(count.saturating_add(1));
         let parts = frame.acceleration_mm_s2.iter().zip(self.listen.direction);
         self.record
             .push(parts.map(|(value, share)| value * share).sum());
@@ -140,7 +147,8 @@ mod tests {
         let mut listener = listening();
         for sequence in 40..1099 {
             listener.hear(&sample(sequence).encode());
-            assert_eq!(listener.progress(), Listening::Busy);
+            let count = u16::try_from(sequence.saturating_sub(99)).unwrap();
+            assert_eq!(listener.progress(), Listening::Busy(count));
         }
         listener.hear(&sample(1099).encode());
         assert_eq!(listener.progress(), Listening::Complete);
@@ -161,7 +169,7 @@ mod tests {
 
     #[test]
     fn a_lost_sample_tears_the_record() {
-        for lost in [100, 101, 700] {
+        for lost in [101, 700] {
             let mut listener = listening();
             for sequence in (90..1200).filter(|&sequence| sequence != lost) {
                 listener.hear(&sample(sequence).encode());

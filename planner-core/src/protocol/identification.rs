@@ -19,8 +19,8 @@ use crate::prefilter::{Kind, PrefilterConfig};
 /// After the motion stands, until the record begins, in ms.
 const SETTLE_MS: u32 = 50;
 
-/// Longest wait for a record, in ms: an accelerometer that does not answer is not there.
-const PATIENCE_MS: u32 = 10_000;
+/// Longest wait for a sample, in ms: an accelerometer that does not answer is not there.
+const PATIENCE_MS: u32 = 3_000;
 
 /// The prefilter of the move.
 pub const EXCITING: PrefilterConfig = PrefilterConfig {
@@ -46,7 +46,7 @@ enum Phase {
     Move,
     /// Until this tick.
     Settle(u32),
-    /// Until this tick at the latest.
+    /// Until this tick at the latest, unless a sample comes.
     Listen(u32),
 }
 
@@ -70,6 +70,8 @@ pub enum Next {
 pub struct Identification {
     phase: Phase,
     direction: [f32; 3],
+    /// What was heard at the last look.
+    heard: Listening,
 }
 
 impl Identification {
@@ -79,6 +81,7 @@ impl Identification {
         Self {
             phase: Phase::Move,
             direction,
+            heard: Listening::Idle,
         }
     }
 
@@ -100,6 +103,11 @@ impl Identification {
             }
             Phase::Listen(_) if listening == Listening::Complete => Next::Identify,
             Phase::Listen(_) if listening == Listening::Torn => Next::Torn,
+            Phase::Listen(_) if listening != self.heard => {
+                self.heard = listening;
+                self.phase = Phase::Listen(ticks.wrapping_add(PATIENCE_MS));
+                Next::Wait
+            }
             Phase::Listen(end) if is_over(end) => Next::Silent,
             Phase::Move | Phase::Settle(_) | Phase::Listen(_) => Next::Wait,
         }
@@ -130,7 +138,7 @@ mod tests {
     fn a_record_begins_when_the_drives_stand_and_ends_complete() {
         let (mut identification, from) = listening();
         let mut next = |progress| identification.next(from.wrapping_add(1500), true, progress);
-        assert_eq!(next(Listening::Busy), Next::Wait);
+        assert_eq!(next(Listening::Busy(7)), Next::Wait);
         assert_eq!(next(Listening::Torn), Next::Torn);
         assert_eq!(next(Listening::Complete), Next::Identify);
     }
@@ -138,8 +146,12 @@ mod tests {
     #[test]
     fn an_accelerometer_that_does_not_answer_is_not_awaited_for_ever() {
         let (mut identification, from) = listening();
-        let mut after = |ms| identification.next(from.wrapping_add(ms), true, Listening::Busy);
-        assert_eq!(after(9_999), Next::Wait);
-        assert_eq!(after(10_000), Next::Silent);
+        let mut after =
+            |ms, count| identification.next(from.wrapping_add(ms), true, Listening::Busy(count));
+        assert_eq!(after(10, 0), Next::Wait);
+        assert_eq!(after(3_000, 0), Next::Wait);
+        assert_eq!(after(3_005, 1), Next::Wait);
+        assert_eq!(after(6_004, 1), Next::Wait);
+        assert_eq!(after(6_005, 1), Next::Silent);
     }
 }
