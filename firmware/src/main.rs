@@ -22,17 +22,19 @@ use static_cell::{ConstStaticCell, StaticCell};
 #[cortex_m_rt::entry]
 fn main() -> ! {
     static EXECUTOR: StaticCell<Executor> = StaticCell::new();
-    let commands = start();
+    let (commands, sample_in) = start();
+    let link = commands.link;
     EXECUTOR.init(Executor::new()).run(|thread| {
         thread.spawn(defmt::unwrap!(idle_task()));
         thread.spawn(defmt::unwrap!(command_task(commands)));
+        thread.spawn(defmt::unwrap!(sample_task(link, sample_in)));
     })
 }
 
-/// Starts the board, the control task and the setpoint task; returns what the command task
-/// needs. Not inlined, because the frame of `main` stays on the stack for ever.
+/// Starts the board, the control task and the setpoint task; returns what the command task and
+/// the sample task need. Not inlined, because the frame of `main` stays on the stack for ever.
 #[inline(never)]
-fn start() -> Commands<CommandIn, CommandOut, BoardFlash> {
+fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
     static LINK: StaticCell<Link> = StaticCell::new();
     static FRAMES: StaticCell<Frames> = StaticCell::new();
     static SEGMENTS: ConstStaticCell<SegmentQueue> = ConstStaticCell::new(SegmentQueue::new());
@@ -78,15 +80,15 @@ fn start() -> Commands<CommandIn, CommandOut, BoardFlash> {
         motion, link, frames, outputs, arm, stopwatch, watchdog
     )));
     setpoints.spawn(defmt::unwrap!(setpoint_task(frames, setpoint_out)));
-    setpoints.spawn(defmt::unwrap!(sample_task(link, sample_in)));
-    Commands {
+    let commands = Commands {
         input: command_in,
         output: command_out,
         controller,
         robot,
         link,
         store: defmt::expect!(Store::new(flash, board::STORE), "the store is whole pages"),
-    }
+    };
+    (commands, sample_in)
 }
 
 #[embassy_executor::task]

@@ -17,11 +17,15 @@ const NOISE_MM_S2: f64 = 10.0;
 /// Ticks of a rest that are kept: a minute.
 const LONGEST_TICKS: usize = 60_000;
 
+/// Lost frames in a row that the plant bridges; more are a controller that started again.
+const LONGEST_GAP: u32 = 100;
+
 /// Full plant and accelerometer.
 #[derive(Debug)]
 pub struct SensedPlant {
     config: FullConfig,
-    plant: Option<FullPlant>,
+    /// With the last frame.
+    plant: Option<(FullPlant, SetpointFrame)>,
     rng: ChaCha8Rng,
     /// Ticks that an answer takes.
     delay: usize,
@@ -54,22 +58,30 @@ impl SensedPlant {
     /// Carries out a setpoint; yields the answer of the accelerometer that arrives then.
     pub fn answer(&mut self, frame: &SetpointFrame) -> Option<SampleFrame> {
         let setpoint = &frame.setpoint;
-        let position = joints(setpoint);
+        let target = JointSetpoint {
+            position: joints(setpoint),
+            velocity: setpoint.joints.velocity.map(f64::from),
+            acceleration: setpoint.joints.acceleration.map(f64::from),
+        };
         // A placed setpoint says where the joints are and moves none.
         if setpoint.placed {
             self.plant = None;
         }
-        let plant = self.plant.get_or_insert_with(|| {
-            FullPlant::new(FullConfig {
-                start: position,
+        let (plant, last) = self.plant.get_or_insert_with(|| {
+            let config = FullConfig {
+                start: target.position,
                 ..self.config.clone()
-            })
+            };
+            (FullPlant::new(config), *frame)
         });
-        let felt = plant.step(JointSetpoint {
-            position,
-            velocity: setpoint.joints.velocity.map(f64::from),
-            acceleration: setpoint.joints.acceleration.map(f64::from),
-        });
+        // Time goes on where frames were lost: the drives hold what they had.
+        let lost = frame.sequence.wrapping_sub(last.sequence).saturating_sub(1);
+        let held = JointSetpoint::at_rest(joints(&last.setpoint));
+        for _ in 0..lost.min(LONGEST_GAP) {
+            plant.step(held);
+        }
+        *last = *frame;
+        let felt = plant.step(target);
         let is_moving = setpoint.state != MotionState::Idle;
         if self.was_moving && !is_moving {
             self.stops += 1;

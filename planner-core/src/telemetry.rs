@@ -293,7 +293,7 @@ mod tests {
     #[test]
     fn the_layout_is_fixed() {
         let body = frame(0x0102_0304).body();
-        assert_eq!(body[..9], [4, 3, 2, 1, 0xC1, 1, 0, 0, 0]);
+        assert_eq!(body[..9], [4, 3, 2, 1, 0xE1, 1, 0, 0, 0]);
         assert_eq!(body[9..13], [0xFE, 0xFF, 0xFF, 0xFF]);
         assert_eq!(body[21..25], [0xFF, 0xFF, 0xFF, 0x7F]);
         assert_eq!(body[41..45], [0, 0, 0, 0x80]);

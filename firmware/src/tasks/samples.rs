@@ -1,7 +1,6 @@
 //! The sample task: what the accelerometer says is recorded while somebody wants it.
 //!
-//! It runs beside the setpoint task, above planning, so that no sample is lost while a line is
-//! planned.
+//! It shares the thread with the command task, which takes no line while a record is made.
 
 use crate::board::ByteIn;
 use crate::tasks::link::Link;

@@ -96,7 +96,7 @@ pub fn execute(args: &EmulateArgs) -> Result<String> {
     if args.plant {
         // It stands wherever the first setpoint says.
         let plant = SensedPlant::new(robot.plant.full([0.0; AXES]), 0);
-        setpoints = PlantPort::attach(setpoints, plant)?.setpoints;
+        (_, setpoints) = PlantPort::attach(setpoints, plant)?;
     }
     let mut bridge = Bridge::new(Ends {
         commands: board.commands.try_clone()?,

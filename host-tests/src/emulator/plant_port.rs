@@ -3,35 +3,47 @@
 
 use std::io::{self, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
+use planner_core::accelerometer::SAMPLE_BYTES;
 use planner_core::telemetry::FrameDecoder;
 
 use crate::sensed_plant::SensedPlant;
 
-/// A plant that follows the setpoints in a thread of its own, one step a frame. The thread ends
-/// with the port.
+/// A plant that follows the setpoints in threads of its own, one step a frame; they end with
+/// the port.
 pub struct PlantPort {
     plant: Arc<Mutex<SensedPlant>>,
-    /// The setpoints go on here, as they came. Who drops it gets none.
-    pub setpoints: TcpStream,
 }
 
 impl PlantPort {
-    /// Puts a plant at the end of the setpoint port.
+    /// Puts a plant at the end of the setpoint port. The setpoints go on through the stream, as
+    /// they came; read it or drop it.
     ///
     /// # Errors
     /// There is no socket to be had.
-    pub fn attach(port: TcpStream, plant: SensedPlant) -> io::Result<Self> {
+    pub fn attach(port: TcpStream, plant: SensedPlant) -> io::Result<(Self, TcpStream)> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
         let onward = TcpStream::connect(listener.local_addr()?)?;
         let (setpoints, _) = listener.accept()?;
         port.set_nodelay(true)?;
         let plant = Arc::new(Mutex::new(plant));
         let theirs = Arc::clone(&plant);
-        thread::spawn(move || follow(port, onward, &theirs));
-        Ok(Self { plant, setpoints })
+        let mut to_port = port.try_clone()?;
+        let (answers, to_send) = channel();
+        let (read, to_follow) = channel();
+        // Each waits for one thing only: QEMU takes in a few bytes a millisecond, and the firmware
+        // drops setpoints that nobody reads.
+        thread::spawn(move || read_on(port, &read));
+        thread::spawn(move || follow(&to_follow, onward, &answers, &theirs));
+        thread::spawn(move || {
+            to_send
+                .iter()
+                .try_for_each(|sample: [u8; SAMPLE_BYTES]| to_port.write_all(&sample))
+        });
+        Ok((Self { plant }, setpoints))
     }
 
     /// The plant as it is now.
@@ -40,31 +52,38 @@ impl PlantPort {
     }
 }
 
-fn follow(mut port: TcpStream, onward: TcpStream, plant: &Mutex<SensedPlant>) {
+/// Carries out what was read until the port closes.
+fn follow(
+    read: &Receiver<Vec<u8>>,
+    onward: TcpStream,
+    answers: &Sender<[u8; SAMPLE_BYTES]>,
+    plant: &Mutex<SensedPlant>,
+) {
     let mut onward = Some(onward);
     let mut decoder = FrameDecoder::new();
-    let mut bytes = [0; 4096];
-    while let Ok(count @ 1..) = port.read(&mut bytes) {
-        let bytes = &bytes[..count];
-        let mut answers = Vec::new();
-        {
+    for bytes in read {
+        for frame in decoder.frames(&bytes) {
             let mut plant = plant.lock().unwrap_or_else(PoisonError::into_inner);
-            for frame in decoder.frames(bytes) {
-                answers.extend(
-                    plant
-                        .answer(&frame)
-                        .iter()
-                        .flat_map(|sample| sample.encode()),
-                );
+            if let Some(sample) = plant.answer(&frame)
+                && answers.send(sample.encode()).is_err()
+            {
+                return;
             }
         }
-        if port.write_all(&answers).is_err() {
-            break;
-        }
         if let Some(stream) = &mut onward
-            && stream.write_all(bytes).is_err()
+            && stream.write_all(&bytes).is_err()
         {
             onward = None;
+        }
+    }
+}
+
+/// Reads on whatever the plant does.
+fn read_on(mut port: TcpStream, read: &Sender<Vec<u8>>) {
+    let mut bytes = [0; 16 * 1024];
+    while let Ok(count @ 1..) = port.read(&mut bytes) {
+        if read.send(bytes[..count].to_vec()).is_err() {
+            break;
         }
     }
 }

@@ -11,13 +11,13 @@ use host_tests::plant::{FullConfig, Mode, ModeMap};
 use host_tests::sensed_plant::SensedPlant;
 
 /// What the firmware does not know.
-const FREQUENCY_HZ: f64 = 4.1;
-const DAMPING: f64 = 0.03;
+const FREQUENCY_HZ: f64 = 2.9;
+const DAMPING: f64 = 0.05;
 
 /// Ticks after a stop in which the vibration counts.
 const FELT_TICKS: usize = 500;
 /// Ticks until it has died away.
-const REST_TICKS: usize = 8000;
+const REST_TICKS: usize = 4000;
 
 /// How long the emulator may take for anything.
 const PATIENCE: Duration = Duration::from_secs(300);
@@ -79,10 +79,11 @@ fn the_firmware_finds_the_mode_and_stills_it() {
     let setpoints = board.setpoints.try_clone().unwrap();
     let commands = board.commands.try_clone().unwrap();
     commands.set_read_timeout(Some(PATIENCE)).unwrap();
+    let (port, _) = PlantPort::attach(setpoints, SensedPlant::new(config, 0)).unwrap();
     let mut desk = Desk {
         answers: BufReader::new(commands.try_clone().unwrap()),
         commands,
-        port: PlantPort::attach(setpoints, SensedPlant::new(config, 0)).unwrap(),
+        port,
     };
     assert!(desk.ask("G0 X220 Y0").ends_with("ok\r\n"));
 

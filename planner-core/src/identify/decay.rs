@@ -140,6 +140,7 @@ impl<const MODES: usize> Fit<MODES> {
     /// The least squares next to a start. `samples` are centred.
     ///
     /// Cost on a Cortex-M4F, a pass over 250 samples: see the README.
+    #[inline(never)]
     pub fn new(start: Model<MODES>, samples: &[f32], period_s: f32) -> Self {
         let length_s = samples.len() as f32 * period_s;
         let freedom = samples.len().saturating_sub(Trial::<MODES>::END).max(1) as f32;
@@ -199,6 +200,7 @@ impl<const MODES: usize> Trial<MODES> {
     };
 
     /// One pass over the record, with the model's amplitudes as a guess.
+    #[inline(never)]
     fn at(model: Model<MODES>, samples: &[f32], period_s: f32) -> Self {
         let Sums { triangle, squares } = Sums::of(&model, samples, period_s);
         let mut trial = Self {
@@ -228,6 +230,7 @@ impl<const MODES: usize> Trial<MODES> {
 
     /// The next rates, with amplitudes as the regression has them, and what it would take off
     /// the squares.
+    #[inline(never)]
     fn next(&self, damping: f32, length_s: f32, period_s: f32) -> (Model<MODES>, f32) {
         let mut triangle = self.triangle;
         let moving = Self::STILL..Self::END;
@@ -260,6 +263,7 @@ impl<const MODES: usize> Trial<MODES> {
     }
 
     /// See [`Fit::variances`].
+    #[inline(never)]
     fn variances(&self) -> [[f32; 2]; MODES] {
         let mut triangle = self.triangle;
         let moving = Self::STILL..Self::END;

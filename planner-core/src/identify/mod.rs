@@ -43,6 +43,8 @@ use scan::Peak;
 /// frequencies that a second of pure noise resolves takes off `2 ln 200` = 11 of them.
 const SIGNIFICANT: f32 = 40.0;
 
+// The parts are kept out of line, so that one's triangles are not on the stack while another works.
+
 /// What a record shows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identified {

@@ -37,6 +37,7 @@ pub struct Peak {
 
 /// The frequency and the window whose sinusoid takes most off the sum of squares of the
 /// `samples`, by Goertzel's recursion.
+#[inline(never)]
 pub fn highest_peak(samples: &[f32], period_s: f32) -> Peak {
     let mut highest = Peak {
         frequency_hz: LOWEST_HZ,

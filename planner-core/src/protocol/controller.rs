@@ -1340,7 +1340,7 @@ impl Controller<'_> {
             identification::Next::Listen(listen) => self.out(Out::Listen(listen)),
             identification::Next::Identify => self.out(Out::Identify),
             identification::Next::Torn => self.not_identified(
-                "A sample of the accelerometer was lost: check its line and identify again",
+                "Samples of the accelerometer were lost: check its line and identify again",
             ),
             identification::Next::Silent => self
                 .not_identified("The accelerometer is silent: check that it answers the setpoints"),

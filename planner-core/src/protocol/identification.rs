@@ -59,7 +59,7 @@ pub enum Next {
     Listen(Listen),
     /// The record is complete.
     Identify,
-    /// A sample was lost.
+    /// Too many samples were lost.
     Torn,
     /// No samples come.
     Silent,
