@@ -139,7 +139,6 @@ const LOWEST_RATE: f32 = 1.5;
 impl<const MODES: usize> Fit<MODES> {
     /// The least squares next to a start. `samples` are centred.
     ///
-    /// Cost on a Cortex-M4F, a pass over 250 samples: see the README.
     #[inline(never)]
     pub fn new(start: Model<MODES>, samples: &[f32], period_s: f32) -> Self {
         let length_s = samples.len() as f32 * period_s;
