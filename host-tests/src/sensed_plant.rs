@@ -4,12 +4,13 @@
 use std::collections::VecDeque;
 
 use planner_core::accelerometer::SampleFrame;
-use planner_core::motion::{MotionState, Setpoint};
+use planner_core::motion::MotionState;
 use planner_core::telemetry::SetpointFrame;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::plant::{FullConfig, FullPlant, JointSetpoint};
+use crate::trace::joints;
 
 /// The accelerometer's noise in mm/s²: evenly distributed up to this.
 const NOISE_MM_S2: f64 = 10.0;
@@ -127,15 +128,4 @@ impl SensedPlant {
         let felt = self.felt_mm_s2.iter().take(ticks);
         felt.map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max)
     }
-}
-
-/// A setpoint's joints: rad, rad, mm, rad.
-fn joints(setpoint: &Setpoint) -> [f64; 4] {
-    let joints = setpoint.joints.position;
-    [
-        joints.joint1.to_num(),
-        joints.joint2.to_num(),
-        joints.joint3.to_num(),
-        joints.joint4.to_num(),
-    ]
 }

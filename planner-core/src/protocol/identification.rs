@@ -27,6 +27,7 @@ pub const EXCITING: PrefilterConfig = PrefilterConfig {
     kind: Kind::Fir,
     frequency_hz: 100.0,
     damping: 0.0,
+    ..PrefilterConfig::DEFAULT
 };
 
 /// A mode as it was identified.
