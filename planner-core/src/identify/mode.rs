@@ -111,20 +111,23 @@ pub fn believed_modes(
     length_s: f32,
 ) -> Result<Vec<IdentifiedMode, MODES>, Refusal> {
     let mut modes = Vec::new();
-    let mut refusal = Refusal::OnlyNoise;
+    let mut refusal = None;
     for found in found {
         match believed(found, length_s) {
             Ok(mode) => {
                 let pushed = modes.push(mode);
                 debug_assert!(pushed.is_ok());
             }
-            Err(_) if !modes.is_empty() => {}
-            Err(why @ (Refusal::NoSwing { .. } | Refusal::NotDecaying { .. })) => refusal = why,
-            Err(why) => return Err(why),
+            Err(why) => {
+                refusal = refusal.or(Some(why));
+                if !matches!(why, Refusal::NoSwing { .. } | Refusal::NotDecaying { .. }) {
+                    break;
+                }
+            }
         }
     }
     if modes.is_empty() {
-        return Err(refusal);
+        return Err(refusal.unwrap_or(Refusal::OnlyNoise));
     }
     Ok(modes)
 }
