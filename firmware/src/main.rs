@@ -5,12 +5,12 @@
 use embassy_executor::Executor;
 use firmware::board::{
     self, Board, BoardArm, BoardFlash, BoardOutputs, BoardWatchdog, CommandIn, CommandOut, Counter,
-    SetpointOut, StackUse, Stopwatch, stack_use,
+    SampleIn, SetpointOut, StackUse, Stopwatch, stack_use,
 };
 use firmware::tasks::command::Commands;
 use firmware::tasks::control::Frames;
 use firmware::tasks::link::Link;
-use firmware::tasks::{command, control, setpoints};
+use firmware::tasks::{command, control, samples, setpoints};
 use planner_core::config::Robot;
 use planner_core::motion::{DelayLines, Motion, MotionSettings};
 use planner_core::planner::Planner;
@@ -22,17 +22,19 @@ use static_cell::{ConstStaticCell, StaticCell};
 #[cortex_m_rt::entry]
 fn main() -> ! {
     static EXECUTOR: StaticCell<Executor> = StaticCell::new();
-    let commands = start();
+    let (commands, sample_in) = start();
+    let link = commands.link;
     EXECUTOR.init(Executor::new()).run(|thread| {
         thread.spawn(defmt::unwrap!(idle_task()));
         thread.spawn(defmt::unwrap!(command_task(commands)));
+        thread.spawn(defmt::unwrap!(sample_task(link, sample_in)));
     })
 }
 
-/// Starts the board, the control task and the setpoint task; returns what the command task
-/// needs. Not inlined, because the frame of `main` stays on the stack for ever.
+/// Starts the board, the control task and the setpoint task; returns what the command task and
+/// the sample task need. Not inlined, because the frame of `main` stays on the stack for ever.
 #[inline(never)]
-fn start() -> Commands<CommandIn, CommandOut, BoardFlash> {
+fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
     static LINK: StaticCell<Link> = StaticCell::new();
     static FRAMES: StaticCell<Frames> = StaticCell::new();
     static SEGMENTS: ConstStaticCell<SegmentQueue> = ConstStaticCell::new(SegmentQueue::new());
@@ -44,6 +46,7 @@ fn start() -> Commands<CommandIn, CommandOut, BoardFlash> {
         command_in,
         command_out,
         setpoint_out,
+        sample_in,
         outputs,
         arm,
         flash,
@@ -75,14 +78,15 @@ fn start() -> Commands<CommandIn, CommandOut, BoardFlash> {
         motion, link, frames, outputs, arm, stopwatch, watchdog
     )));
     setpoints.spawn(defmt::unwrap!(setpoint_task(frames, setpoint_out)));
-    Commands {
+    let commands = Commands {
         input: command_in,
         output: command_out,
         controller,
         robot: ROBOT.init(MotionSettings::from(robot)),
         link,
         store: defmt::expect!(Store::new(flash, board::STORE), "the store is whole pages"),
-    }
+    };
+    (commands, sample_in)
 }
 
 #[embassy_executor::task]
@@ -101,6 +105,11 @@ async fn control_task(
 #[embassy_executor::task]
 async fn setpoint_task(frames: &'static Frames, port: SetpointOut) {
     setpoints::run(frames, port).await
+}
+
+#[embassy_executor::task]
+async fn sample_task(link: &'static Link, port: SampleIn) {
+    samples::run(link, port).await
 }
 
 #[embassy_executor::task]

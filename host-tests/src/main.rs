@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use host_tests::commands::{
-    Failure, compare, corner, demo, emulate, forward, inverse, methods, monitor, overlap,
+    Failure, compare, corner, demo, emulate, forward, identify, inverse, methods, monitor, overlap,
     prefilter, profile, run, send,
 };
 
@@ -42,6 +42,8 @@ enum Command {
     Prefilter(prefilter::PrefilterArgs),
     /// Plans one move whose mode changes along its way, and simulates what the mode does.
     Profile(profile::ProfileArgs),
+    /// Finds frequency and damping of a mode in the record of its free decay.
+    Identify(identify::IdentifyArgs),
     /// From a pose to the joints, in the microcontroller's arithmetic.
     Inverse(inverse::InverseArgs),
     /// From the joints to a pose, in the microcontroller's arithmetic.
@@ -61,6 +63,7 @@ fn main() -> ExitCode {
         Some(Command::Overlap(args)) => overlap::execute(&args),
         Some(Command::Prefilter(args)) => prefilter::execute(&args),
         Some(Command::Profile(args)) => profile::execute(&args),
+        Some(Command::Identify(args)) => return end(identify::execute(&args)),
         Some(Command::Inverse(args)) => inverse::execute(&args),
         Some(Command::Forward(args)) => forward::execute(&args),
     };

@@ -3,9 +3,11 @@
 
 use std::collections::HashMap;
 
+use crate::sensed_plant::SensedPlant;
 use crate::switched_arm::SwitchedArm;
 use fixed::traits::ToFixed;
 use planner_core::config::Robot;
+use planner_core::identify::Listener;
 use planner_core::motion::{DelayLines, Motion, Order, Setpoint};
 use planner_core::planner::Planner;
 use planner_core::pose::{JointPosition, Pose};
@@ -13,6 +15,7 @@ use planner_core::protocol::{
     Controller, Health, Identity, Inputs, RECORD_BYTES, Record, Report, Settings, Step,
 };
 use planner_core::queue::{LOOKAHEAD, SegmentQueue};
+use planner_core::telemetry::SetpointFrame;
 
 /// Bytes that a port hands over at once.
 const PORT_BYTES: usize = 64;
@@ -37,6 +40,9 @@ pub struct SerialLoop<'q> {
     pub arm: Option<SwitchedArm>,
     /// What absolute encoders read, if there are any.
     pub encoders: Option<JointPosition>,
+    /// A plant on the second port, whose accelerometer answers the setpoints.
+    pub plant: Option<SensedPlant>,
+    listener: Listener,
     /// Whether what is to be kept is kept.
     pub store_works: bool,
     /// Banners said.
@@ -73,6 +79,8 @@ pub fn with_controller<R>(records: Records, body: impl FnOnce(&mut SerialLoop<'_
         inputs: Inputs::default(),
         arm: None,
         encoders: None,
+        plant: None,
+        listener: Listener::new(),
         store_works: true,
         banners: 0,
     };
@@ -193,6 +201,17 @@ impl SerialLoop<'_> {
         if let Some(arm) = &mut self.arm {
             arm.follow(&setpoint);
         }
+        if let Some(plant) = &mut self.plant {
+            let frame = SetpointFrame {
+                sequence: self.report.health.ticks,
+                setpoint,
+                listening: self.listener.is_busy(),
+                ..SetpointFrame::default()
+            };
+            if let Some(sample) = plant.answer(&frame) {
+                self.listener.hear(&sample.encode());
+            }
+        }
         self.report = Report {
             setpoint,
             previous_pose: before,
@@ -200,6 +219,7 @@ impl SerialLoop<'_> {
             orders: self.obeyed,
             inputs: self.inputs,
             encoders: self.encoders,
+            listening: self.listener.progress(),
             health: Health {
                 ticks: self.report.health.ticks.wrapping_add(1),
                 ..self.report.health
@@ -236,6 +256,8 @@ impl SerialLoop<'_> {
                 self.records.clear();
                 self.controller.kept(true);
             }
+            Step::Listen(listen) => self.listener.listen(listen),
+            Step::Identify => self.controller.identified(&self.listener.identify()),
             Step::Wait(_) => return false,
         }
         true

@@ -4,6 +4,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod accelerometer;
 mod arcs;
 mod changeover;
 pub mod config;
@@ -11,6 +12,7 @@ pub mod corner;
 mod dense;
 pub mod gcode;
 pub mod hop;
+pub mod identify;
 pub mod joint_space;
 pub mod kinematics;
 pub mod limits;

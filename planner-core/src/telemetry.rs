@@ -11,7 +11,7 @@
 //! | offset | field | |
 //! |---|---|---|
 //! | 0 | sequence | u32, one more each tick |
-//! | 4 | state | u8, 0 idle, 1 running, 2 stopping, 3 held, 4 paused; bit 6: a delta's joints; bit 7: placed |
+//! | 4 | state | u8, 0 idle, 1 running, 2 stopping, 3 held, 4 paused; bit 5: samples wanted; bit 6: a delta's joints; bit 7: placed |
 //! | 5 | pose | 4 × i32, raw bits of X, Y, Z (2^-19 mm) and C (2^-19 °) |
 //! | 21 | joint position | 4 × i32, raw bits (2^-26 rad; a SCARA's joint 3 2^-19 mm) |
 //! | 37 | joint velocity | 4 × f32, rad/s and mm/s |
@@ -39,6 +39,9 @@ const PLACED: u8 = 1 << 7;
 /// Marks the joints of a delta, likewise.
 const DELTA: u8 = 1 << 6;
 
+/// Marks a frame that the accelerometer has to answer ([`crate::accelerometer`]).
+const LISTENING: u8 = 1 << 5;
+
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// One control tick, as it leaves the controller.
@@ -52,6 +55,8 @@ pub struct SetpointFrame {
     pub tick_cost: u32,
     /// Control periods missed since the start.
     pub overruns: u32,
+    /// Whether the accelerometer has to answer with a sample.
+    pub listening: bool,
 }
 
 impl SetpointFrame {
@@ -78,10 +83,9 @@ impl SetpointFrame {
             ArmKind::Scara => 0,
             ArmKind::Delta => DELTA,
         };
-        put(
-            &mut rest,
-            [state_to_byte(self.setpoint.state) | delta | placed],
-        );
+        let listening = if self.listening { LISTENING } else { 0 };
+        let state = state_to_byte(self.setpoint.state);
+        put(&mut rest, [state | delta | placed | listening]);
         for bits in self.setpoint.pose.to_bits() {
             put(&mut rest, bits.to_le_bytes());
         }
@@ -124,12 +128,13 @@ impl SetpointFrame {
                 } else {
                     ArmKind::Delta
                 },
-                state: state_from_byte(state & !(PLACED | DELTA))?,
+                state: state_from_byte(state & !(PLACED | DELTA | LISTENING))?,
                 placed: state & PLACED != 0,
                 outputs,
             },
             tick_cost,
             overruns,
+            listening: state & LISTENING != 0,
         })
     }
 }
@@ -280,6 +285,7 @@ mod tests {
             },
             tick_cost: 1999,
             overruns: 3,
+            listening: true,
         }
     }
 
@@ -287,7 +293,7 @@ mod tests {
     #[test]
     fn the_layout_is_fixed() {
         let body = frame(0x0102_0304).body();
-        assert_eq!(body[..9], [4, 3, 2, 1, 0xC1, 1, 0, 0, 0]);
+        assert_eq!(body[..9], [4, 3, 2, 1, 0xE1, 1, 0, 0, 0]);
         assert_eq!(body[9..13], [0xFE, 0xFF, 0xFF, 0xFF]);
         assert_eq!(body[21..25], [0xFF, 0xFF, 0xFF, 0x7F]);
         assert_eq!(body[41..45], [0, 0, 0, 0x80]);
@@ -351,7 +357,7 @@ mod tests {
         fn every_frame_survives(
             sequence: u32, pose: [i32; 4], position: [i32; 4], velocity: [u32; 4],
             acceleration: [u32; 4], tick_cost: u32, overruns: u32, state: u8, outputs: u8, placed: bool,
-            is_delta: bool,
+            is_delta: bool, listening: bool,
         ) {
             let sent = SetpointFrame {
                 sequence,
@@ -373,6 +379,7 @@ mod tests {
                 },
                 tick_cost,
                 overruns,
+                listening,
             };
             let wire = sent.encode();
             prop_assert_eq!(wire.iter().filter(|&&byte| byte == 0).count(), 1);

@@ -12,6 +12,7 @@ use firmware::board::{self, Console, Counter, Stopwatch};
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::corner::{self, CornerRule, Side};
 use planner_core::gcode::{Defaults, Interpreter, Line};
+use planner_core::identify::{Record, identify};
 use planner_core::kinematics::ArmKind;
 use planner_core::motion::{DelayLines, Motion, MotionState, Order};
 use planner_core::orientation::Orientation;
@@ -73,6 +74,8 @@ fn main() -> ! {
     deltas(&mut bench, filters);
     link(&mut bench, filters);
     corners(&mut bench);
+    bench.overlap();
+    identifications(&mut bench);
     bench.end()
 }
 
@@ -139,7 +142,6 @@ fn link(bench: &mut Bench, filters: &mut DelayLines) {
     let served = bench.serve(&robot(Kind::FirZvd, 6.34), half_millimetres, filters);
     bench.print(format_args!("link/line"), served.line_mean);
     bench.print(format_args!("link/status"), served.status);
-    bench.overlap();
 }
 
 #[inline(never)]
@@ -147,6 +149,14 @@ fn corners(bench: &mut Bench) {
     for kind in Kind::ALL {
         let worst = bench.corners(&robot(kind, 6.34));
         bench.print(format_args!("corner/{}", kind.name()), worst);
+    }
+}
+
+#[inline(never)]
+fn identifications(bench: &mut Bench) {
+    for (name, samples) in [("identify/1s", 1000), ("identify/2s", 2000)] {
+        let worst = bench.identify(samples);
+        bench.print(format_args!("{name}"), worst);
     }
 }
 
@@ -166,7 +176,6 @@ fn robot_with_map(kind: Kind) -> Robot {
 }
 
 #[inline(never)]
-fn robot(kind: Kind, frequency_hz: f32) -> Robot {
 fn robot(kind: Kind, frequency_hz: f32) -> Robot {
     robot_of(config(kind, frequency_hz))
 }
@@ -359,7 +368,11 @@ impl Bench {
                         report.setpoint = motion.tick();
                         report.health.ticks += 1;
                     }
-                    Step::Robot | Step::Keep(_) | Step::ForgetRecords => {}
+                    Step::Robot
+                    | Step::Keep(_)
+                    | Step::ForgetRecords
+                    | Step::Listen(_)
+                    | Step::Identify => {}
                 }
             }
             lines += 1;
@@ -450,6 +463,43 @@ impl Bench {
         }
         self.print(format_args!("overlap/instant"), cost);
         self.print(format_args!("overlap/bits"), bits);
+    }
+
+    /// The dearest record of so many samples, over frequencies, dampings and noise; nothing of
+    /// it is taken before the last sample has come.
+    fn identify(&self, samples: u16) -> u32 {
+        let mut worst = 0;
+        let mut noise = 1_u32;
+        for step in 0..24_u16 {
+            let frequency_hz = 2.0 + 1.6 * f32::from(step);
+            let damping = [0.0005, 0.005, 0.02, 0.08][usize::from(step % 4)];
+            let share = [0.0, 0.3, 0.1][usize::from(step % 3)];
+            let mut record = Record::new();
+            for at in 0..samples {
+                let time_s = f32::from(at) * 0.001;
+                let swing = |frequency_hz: f32, damping: f32| {
+                    let turns = frequency_hz * time_s;
+                    let turns = turns - turns as u32 as f32;
+                    let (_, cos) = planner_core::math::sin_cos_f32(turns * core::f32::consts::TAU);
+                    // e^-x, well enough for a decay
+                    let x = core::f32::consts::TAU * damping * frequency_hz * time_s / 64.0;
+                    let mut decay = 1.0 / (1.0 + x + 0.5 * x * x);
+                    for _ in 0..6 {
+                        decay *= decay;
+                    }
+                    decay * cos
+                };
+                noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let noise = (noise >> 16) as f32 / 65_536.0 - 0.5;
+                let value = swing(frequency_hz, damping) + share * swing(1.7 * frequency_hz, 0.01);
+                record.push(1000.0 * (0.5 + value + 0.2 * noise));
+            }
+            let mut is_found = false;
+            let cost = self.count(|| is_found = identify(black_box(&mut record)).is_ok());
+            defmt::assert!(is_found, "a mode stands out");
+            worst = worst.max(cost);
+        }
+        worst
     }
 
     /// The dearest corner over angles, feedrates, tolerances, lines and arcs.

@@ -32,13 +32,15 @@ compile_error!("choose one board: `nucleo-g474re` is the default, so add --no-de
 compile_error!("choose a board: feature `nucleo-g474re` or `mps2-an386`");
 
 /// What a board gives the tasks.
-pub struct Board<I, O, S, D, A, F, W, T> {
+pub struct Board<I, O, S, M, D, A, F, W, T> {
     /// Commands come in here.
     pub command_in: I,
     /// Answers go out here.
     pub command_out: O,
     /// Setpoints go out here.
     pub setpoint_out: S,
+    /// Samples of the accelerometer come in here: the setpoint port's other direction.
+    pub sample_in: M,
     /// Drives the gripper and the blow-off.
     pub outputs: D,
     /// Senses the arm.

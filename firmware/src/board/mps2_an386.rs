@@ -47,6 +47,7 @@ pub type Parts = Board<
     CommandIn,
     CommandOut,
     SetpointOut,
+    SampleIn,
     BoardOutputs,
     BoardArm,
     BoardFlash,
@@ -118,6 +119,8 @@ impl Uart {
 #[repr(u16)]
 enum Interrupt {
     CommandRx = 0,
+    /// UART1's.
+    SampleRx = 2,
     /// 29 and 30 are wired to nothing and run the executors.
     Setpoints = 29,
     Control = 30,
@@ -130,12 +133,12 @@ unsafe impl InterruptNumber for Interrupt {
     }
 }
 
-/// Lower is more urgent; the time driver has 0. The receiver comes last because
+/// Lower is more urgent; the time driver has 0. The receivers come last because
 /// QEMU holds a byte back until the one before it was read.
 mod priority {
     pub const CONTROL: u8 = 0x20;
     pub const SETPOINTS: u8 = 0x40;
-    pub const COMMAND_RX: u8 = 0x60;
+    pub const RX: u8 = 0x60;
 }
 
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
@@ -159,7 +162,7 @@ pub fn start() -> Parts {
     core.SYST.enable_interrupt();
 
     Uart::COMMANDS.enable(Uart::TX_ENABLE | Uart::RX_ENABLE | Uart::RX_INTERRUPT);
-    Uart::SETPOINTS.enable(Uart::TX_ENABLE);
+    Uart::SETPOINTS.enable(Uart::TX_ENABLE | Uart::RX_ENABLE | Uart::RX_INTERRUPT);
 
     // SAFETY: no critical section relies on a priority, and the executors are
     // started after theirs is set.
@@ -169,14 +172,16 @@ pub fn start() -> Parts {
             .set_priority(Interrupt::Control, priority::CONTROL);
         core.NVIC
             .set_priority(Interrupt::Setpoints, priority::SETPOINTS);
-        core.NVIC
-            .set_priority(Interrupt::CommandRx, priority::COMMAND_RX);
+        core.NVIC.set_priority(Interrupt::CommandRx, priority::RX);
+        core.NVIC.set_priority(Interrupt::SampleRx, priority::RX);
         cortex_m::peripheral::NVIC::unmask(Interrupt::CommandRx);
+        cortex_m::peripheral::NVIC::unmask(Interrupt::SampleRx);
     }
     Board {
         command_in: CommandIn(()),
         command_out: UartOut(Uart::COMMANDS),
         setpoint_out: UartOut(Uart::SETPOINTS),
+        sample_in: SampleIn(()),
         outputs: BoardOutputs(()),
         arm: BoardArm::at_power_up(),
         flash: BoardFlash::start(),
@@ -225,10 +230,12 @@ impl core::fmt::Write for Console {
 #[cortex_m_rt::exception]
 unsafe fn DefaultHandler(number: i16) {
     const COMMAND_RX: i16 = Interrupt::CommandRx as i16;
+    const SAMPLE_RX: i16 = Interrupt::SampleRx as i16;
     const CONTROL_: i16 = Interrupt::Control as i16;
     const SETPOINTS_: i16 = Interrupt::Setpoints as i16;
     match number {
-        COMMAND_RX => receive(),
+        COMMAND_RX => COMMANDS.receive(),
+        SAMPLE_RX => SAMPLES.receive(),
         // SAFETY: this is the executor's interrupt, unmasked by its `start`.
         CONTROL_ => unsafe { CONTROL.on_interrupt() },
         // SAFETY: likewise.
@@ -237,34 +244,46 @@ unsafe fn DefaultHandler(number: i16) {
     }
 }
 
-/// Bytes between the receive interrupt and the command task.
+/// Bytes between a receive interrupt and the task that reads them.
 const RX_RING: usize = 128;
 
-static RECEIVED: Mutex<RefCell<Deque<u8, RX_RING>>> = Mutex::new(RefCell::new(Deque::new()));
-static RECEIVED_SOME: AtomicWaker = AtomicWaker::new();
-
-/// Takes a byte, unless the ring is full: then QEMU keeps the next ones back until
-/// [`CommandIn::read`] has made room, and nothing is lost.
-fn receive() {
-    Uart::COMMANDS.clear_rx_interrupt();
-    critical_section::with(|cs| {
-        let mut ring = RECEIVED.borrow_ref_mut(cs);
-        if !ring.is_full() && Uart::COMMANDS.state() & Uart::RX_FULL != 0 {
-            let _ = ring.push_back(Uart::COMMANDS.data().read() as u8);
-        }
-    });
-    RECEIVED_SOME.wake();
+/// A port's receiving side.
+struct Receiver {
+    uart: Uart,
+    ring: Mutex<RefCell<Deque<u8, RX_RING>>>,
+    received_some: AtomicWaker,
 }
 
-/// The command port's receiving side; one only, because it is made once.
-pub struct CommandIn(());
+static COMMANDS: Receiver = Receiver::new(Uart::COMMANDS);
+static SAMPLES: Receiver = Receiver::new(Uart::SETPOINTS);
 
-impl ByteIn for CommandIn {
-    async fn read(&mut self, into: &mut [u8]) -> usize {
+impl Receiver {
+    const fn new(uart: Uart) -> Self {
+        Self {
+            uart,
+            ring: Mutex::new(RefCell::new(Deque::new())),
+            received_some: AtomicWaker::new(),
+        }
+    }
+
+    /// Takes a byte, unless the ring is full: then QEMU keeps the next ones back until
+    /// [`Receiver::read`] has made room, and nothing is lost.
+    fn receive(&self) {
+        self.uart.clear_rx_interrupt();
+        critical_section::with(|cs| {
+            let mut ring = self.ring.borrow_ref_mut(cs);
+            if !ring.is_full() && self.uart.state() & Uart::RX_FULL != 0 {
+                let _ = ring.push_back(self.uart.data().read() as u8);
+            }
+        });
+        self.received_some.wake();
+    }
+
+    async fn read(&self, into: &mut [u8]) -> usize {
         poll_fn(|context| {
-            RECEIVED_SOME.register(context.waker());
+            self.received_some.register(context.waker());
             let count = critical_section::with(|cs| {
-                let mut ring = RECEIVED.borrow_ref_mut(cs);
+                let mut ring = self.ring.borrow_ref_mut(cs);
                 let mut count = 0;
                 for place in into.iter_mut() {
                     let Some(byte) = ring.pop_front() else { break };
@@ -276,10 +295,28 @@ impl ByteIn for CommandIn {
             if count == 0 {
                 return Poll::Pending;
             }
-            receive();
+            self.receive();
             Poll::Ready(count)
         })
         .await
+    }
+}
+
+/// The command port's receiving side; one only, because it is made once.
+pub struct CommandIn(());
+
+impl ByteIn for CommandIn {
+    async fn read(&mut self, into: &mut [u8]) -> usize {
+        COMMANDS.read(into).await
+    }
+}
+
+/// The setpoint port's receiving side, on which the accelerometer's samples come.
+pub struct SampleIn(());
+
+impl ByteIn for SampleIn {
+    async fn read(&mut self, into: &mut [u8]) -> usize {
+        SAMPLES.read(into).await
     }
 }
 

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | commands | LPUART1, PA2 / PA3: the ST-LINK's virtual serial port, 115200 Bd |
 //! | setpoints | USART1 TX on PC4 (Arduino D1), 2 MBd |
+//! | accelerometer | USART1 RX on PC5 (Arduino D0), 2 MBd: a sample frame for each setpoint frame |
 //! | outputs | gripper PA5 (Arduino D13, LED LD2), blow-off PA6 (D12); high is on |
 //! | inputs | limits of joints 1 to 4 on PA0, PA1, PA4, PB0 (A0 to A3), door PC1 (A4); pulled up, a switch to ground is active |
 //! | clock | HSE 24 MHz, PLL ÷ 6 × 85 ÷ 2 |
@@ -18,9 +19,11 @@ use embassy_stm32::flash::{self, Blocking, Flash};
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::mode::Async;
-use embassy_stm32::peripherals::{DMA1_CH1, IWDG, LPUART1};
+use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2, IWDG, LPUART1, USART1};
 use embassy_stm32::time::Hertz;
-use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, BufferedUartTx, UartTx};
+use embassy_stm32::usart::{
+    self, BufferedUart, BufferedUartRx, BufferedUartTx, RingBufferedUartRx, Uart, UartTx,
+};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, rcc};
 use embedded_io_async::{Read, Write};
@@ -40,6 +43,7 @@ pub type Parts = Board<
     CommandIn,
     CommandOut,
     SetpointOut,
+    SampleIn,
     BoardOutputs,
     BoardArm,
     BoardFlash,
@@ -54,6 +58,9 @@ const SETPOINT_BAUD: u32 = 2_000_000;
 
 /// The command task may be planning while bytes arrive: 22 ms of them at 115200 Bd.
 const RX_RING: usize = 256;
+
+/// Samples of the accelerometer that wait: eleven of them, while the DMA writes on.
+const SAMPLE_RING: usize = 256;
 
 /// The longest answer and some more.
 const TX_RING: usize = 256;
@@ -70,7 +77,9 @@ mod priority {
 
 bind_interrupts!(struct Irqs {
     LPUART1 => usart::BufferedInterruptHandler<LPUART1>;
+    USART1 => usart::InterruptHandler<USART1>;
     DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>;
+    DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>;
 });
 
 /// The executors run in the interrupts of peripherals which this board does not use.
@@ -109,10 +118,14 @@ pub fn start() -> Parts {
 
     let mut serial = usart::Config::default();
     serial.baudrate = SETPOINT_BAUD;
-    let setpoints = UartTx::new(p.USART1, p.PC4, p.DMA1_CH1, Irqs, serial);
-    let setpoints = defmt::unwrap!(setpoints, "2 MBd is within USART1's range");
+    static SAMPLES: ConstStaticCell<[u8; SAMPLE_RING]> = ConstStaticCell::new([0; SAMPLE_RING]);
+    let port = Uart::new(p.USART1, p.PC5, p.PC4, p.DMA1_CH1, p.DMA1_CH2, Irqs, serial);
+    let port = defmt::unwrap!(port, "2 MBd is within USART1's range");
+    let (setpoints, samples) = port.split();
+    let samples = samples.into_ring_buffered(SAMPLES.take());
 
     interrupt::LPUART1.set_priority(priority::COMMANDS);
+    interrupt::USART1.set_priority(priority::COMMANDS);
     interrupt::SAI1.set_priority(priority::CONTROL);
     interrupt::UCPD1.set_priority(priority::SETPOINTS);
     let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_MS * 1000);
@@ -121,6 +134,7 @@ pub fn start() -> Parts {
         command_in: CommandIn(command_in),
         command_out: CommandOut(command_out),
         setpoint_out: SetpointOut(setpoints),
+        sample_in: SampleIn(samples),
         outputs: BoardOutputs {
             gripper: Output::new(p.PA5, Level::Low, Speed::Low),
             blow_off: Output::new(p.PA6, Level::Low, Speed::Low),
@@ -198,6 +212,21 @@ impl ByteOut for SetpointOut {
     async fn write_all(&mut self, bytes: &[u8]) {
         if let Err(error) = self.0.write(bytes).await {
             defmt::warn!("setpoint port: {}", error);
+        }
+    }
+}
+
+/// The setpoint port's receiving side, on which the accelerometer's samples come.
+pub struct SampleIn(RingBufferedUartRx<'static>);
+
+impl ByteIn for SampleIn {
+    async fn read(&mut self, into: &mut [u8]) -> usize {
+        loop {
+            match self.0.read(into).await {
+                Ok(count) if count > 0 => return count,
+                Ok(_) => {}
+                Err(error) => defmt::warn!("setpoint port: {}", error),
+            }
         }
     }
 }

@@ -48,7 +48,8 @@ pub async fn run<F: NorFlash<Error: Debug>>(commands: Commands<impl ByteIn, impl
         // A deadline that is now still takes what the port already has, so that a realtime
         // byte is heeded between any two steps.
         let mut wake = now;
-        match controller.step(now.as_millis(), &link.report()) {
+        let report = link.report().await;
+        match controller.step(now.as_millis(), &report) {
             Step::Say(text) => output.write_all(text.as_bytes()).await,
             Step::Order(order) => link.order(order).await,
             Step::Robot => {
@@ -64,6 +65,11 @@ pub async fn run<F: NorFlash<Error: Debug>>(commands: Commands<impl ByteIn, impl
             Step::ForgetRecords => {
                 let erased = store.erase().await;
                 controller.kept(erased.is_ok());
+            }
+            Step::Listen(listen) => link.listener().await.listen(listen),
+            Step::Identify => {
+                let result = link.listener().await.identify();
+                controller.identified(&result);
             }
             Step::Wait(until_ms) => {
                 wake = until_ms.map_or(Instant::MAX, |ms| Instant::MIN + Duration::from_millis(ms));

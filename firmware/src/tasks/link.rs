@@ -6,6 +6,8 @@ use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
+use embassy_sync::mutex::{self, MutexGuard};
+use planner_core::identify::Listener;
 use planner_core::motion::{self, MotionSettings};
 use planner_core::protocol::Report;
 
@@ -28,6 +30,8 @@ pub struct Link {
     report: Mutex<CriticalSectionRawMutex, Cell<Report>>,
     program_open: AtomicBool,
     inputs_inverted: AtomicU8,
+    listening: AtomicBool,
+    listener: mutex::Mutex<CriticalSectionRawMutex, Listener>,
 }
 
 type Orders = Channel<CriticalSectionRawMutex, Order, ORDERS>;
@@ -41,6 +45,8 @@ impl Default for Link {
             report: Mutex::new(Cell::default()),
             program_open: AtomicBool::new(false),
             inputs_inverted: AtomicU8::new(0),
+            listening: AtomicBool::new(false),
+            listener: mutex::Mutex::new(Listener::new()),
         }
     }
 }
@@ -72,9 +78,20 @@ impl Link {
         self.inputs_inverted.store(bits, Ordering::Relaxed);
     }
 
-    /// Command task: the last tick's report.
-    pub fn report(&self) -> Report {
-        self.report.lock(Cell::get)
+    /// Command task: the last tick's report, with what the accelerometer has said so far.
+    pub async fn report(&self) -> Report {
+        let listener = self.listener().await;
+        self.listening.store(listener.is_busy(), Ordering::Relaxed);
+        Report {
+            listening: listener.progress(),
+            ..self.report.lock(Cell::get)
+        }
+    }
+
+    /// Sample task and command task: the accelerometer's record. While one has it the other
+    /// waits, and interrupts do not.
+    pub async fn listener(&self) -> MutexGuard<'_, CriticalSectionRawMutex, Listener> {
+        self.listener.lock().await
     }
 
     /// Control task: the next order, if there is one.
@@ -96,6 +113,11 @@ impl Link {
     /// Control task: see [`Link::set_inputs_inverted`].
     pub fn inputs_inverted(&self) -> u8 {
         self.inputs_inverted.load(Ordering::Relaxed)
+    }
+
+    /// Control task: whether the accelerometer's samples are wanted.
+    pub fn is_listening(&self) -> bool {
+        self.listening.load(Ordering::Relaxed)
     }
 
     /// Control task: tells about the tick.

@@ -3,4 +3,5 @@
 pub mod command;
 pub mod control;
 pub mod link;
+pub mod samples;
 pub mod setpoints;

@@ -11,13 +11,15 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
+use planner_core::pose::AXES;
 use serde_json::json;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::bridge::{Bridge, Ends, Ports, listen};
-use crate::emulator::{Board, EmulatedBoard, Pace, build_image, check_qemu};
+use crate::emulator::{Board, EmulatedBoard, Pace, PlantPort, build_image, check_qemu};
 use crate::machine::settings;
 use crate::robot_file::RobotSettings;
+use crate::sensed_plant::SensedPlant;
 
 /// A signal from the terminal ends QEMU too; whoever is told first waits so long for the other.
 const SIGNAL_SPREADS: Duration = Duration::from_millis(300);
@@ -46,6 +48,10 @@ pub struct EmulateArgs {
     /// Robot file (TOML) whose settings the controller gets; its own if there is none.
     #[arg(long, value_name = "FILE")]
     robot: Option<PathBuf>,
+    /// Let the simulated robot of the robot file follow the setpoints; its accelerometer answers
+    /// them, so that the controller can identify its mode.
+    #[arg(long)]
+    plant: bool,
     /// File that the controller's flash is kept in, made if there is none (16 MiB, mostly
     /// empty): settings and offsets outlast the emulator. Without it they outlast a reset.
     #[arg(long, value_name = "FILE")]
@@ -69,8 +75,9 @@ pub struct EmulateArgs {
 /// # Errors
 /// What is missing, a port that is taken, or the end of QEMU, in one sentence.
 pub fn execute(args: &EmulateArgs) -> Result<String> {
+    let robot = RobotSettings::load(args.robot.as_deref())?;
     let lines = match &args.robot {
-        Some(file) => settings(&RobotSettings::load(Some(file))?.robot),
+        Some(_) => settings(&robot.robot),
         None => Vec::new(),
     };
     let command_clients = open_port(args.tcp, "--tcp")?;
@@ -85,9 +92,15 @@ pub fn execute(args: &EmulateArgs) -> Result<String> {
         Pace::RealTime
     };
     let mut board = EmulatedBoard::boot(image, pace, args.flash.as_deref(), &lines)?;
+    let mut setpoints = board.setpoints.try_clone()?;
+    if args.plant {
+        // It stands wherever the first setpoint says.
+        let plant = SensedPlant::new(robot.plant.full([0.0; AXES]), 0);
+        (_, setpoints) = PlantPort::attach(setpoints, plant)?;
+    }
     let mut bridge = Bridge::new(Ends {
         commands: board.commands.try_clone()?,
-        setpoints: board.setpoints.try_clone()?,
+        setpoints,
         command_clients,
         setpoint_clients,
     })

@@ -7,6 +7,7 @@ pub mod demo;
 pub mod emulate;
 mod failure;
 pub mod forward;
+pub mod identify;
 pub mod inverse;
 pub mod methods;
 mod model_args;

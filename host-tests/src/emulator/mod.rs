@@ -7,6 +7,7 @@
 mod command_port;
 mod image;
 mod instructions;
+mod plant_port;
 mod ports;
 mod qemu;
 mod run;
@@ -15,6 +16,7 @@ mod setpoint_port;
 pub use command_port::Answer;
 pub use image::{Board, build_image};
 pub use instructions::measure_instructions;
+pub use plant_port::PlantPort;
 pub use ports::EmulatedBoard;
 pub use qemu::{Pace, check_qemu};
 pub use run::{Emulator, EmulatorRun, StackUse, TickStatistics};

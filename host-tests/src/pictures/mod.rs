@@ -6,6 +6,7 @@
 mod canvas;
 mod comparison;
 mod feedrate;
+mod identified;
 mod limits;
 mod path;
 mod payload;
@@ -17,6 +18,7 @@ pub use comparison::ShownMotion;
 
 use anyhow::Result;
 
+use crate::commands::identify::Identification;
 use crate::commands::profile::SimulatedMove;
 use crate::paired_run::PairedRun;
 
@@ -53,4 +55,12 @@ pub fn draw_comparison(title: &str, subtitle: &str, motions: &[ShownMotion<'_>])
 /// Never in practice: the drawing goes to memory.
 pub fn draw_profile(simulated: &SimulatedMove) -> Result<String> {
     profile::draw(simulated)
+}
+
+/// Draws the picture of a record with what was found in it.
+///
+/// # Errors
+/// Never in practice: the drawing goes to memory.
+pub fn draw_identified(identification: &Identification) -> Result<String> {
+    identified::draw(identification)
 }

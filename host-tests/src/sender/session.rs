@@ -43,6 +43,8 @@ pub struct Answer {
     pub error: Option<u8>,
     /// `[NAME:…]` lines, without brackets.
     pub info: Vec<String>,
+    /// `[MSG:…]` lines, without their frame.
+    pub messages: Vec<String>,
     /// Values of settings.
     pub settings: Vec<(String, String)>,
 }
@@ -171,10 +173,18 @@ impl Session {
     /// # Errors
     /// The link is lost.
     pub fn ask(&mut self, line: &str) -> Result<Answer, LinkError> {
+        self.ask_patiently(line, ANSWER)
+    }
+
+    /// Likewise, for an answer that may take so long.
+    ///
+    /// # Errors
+    /// The link is lost.
+    pub fn ask_patiently(&mut self, line: &str, patience: Duration) -> Result<Answer, LinkError> {
         self.send(format!("{line}\n").as_bytes())?;
         let mut answer = Answer::default();
         let start = Instant::now();
-        while start.elapsed() < ANSWER {
+        while start.elapsed() < patience {
             match self.hear()? {
                 Some(Reply::Ok) => return Ok(answer),
                 Some(Reply::Error(code)) => {
@@ -182,12 +192,13 @@ impl Session {
                     return Ok(answer);
                 }
                 Some(Reply::Info(info)) => answer.info.push(info),
+                Some(Reply::Message(message)) => answer.messages.push(message),
                 Some(Reply::Setting { name, value }) => answer.settings.push((name, value)),
                 _ => {}
             }
         }
         let address = self.connection.address().clone();
-        Err(LinkError::Silent(address, ANSWER.as_secs_f64()))
+        Err(LinkError::Silent(address, patience.as_secs_f64()))
     }
 
     /// Bytes of unanswered lines that the controller can hold.

@@ -1,6 +1,7 @@
 //! The program `stillpoint` from outside: flags, JSON keys, exit status, sentences, files.
 
 mod calculators;
+mod identify;
 mod on_emulator;
 mod refusals;
 mod run;

@@ -147,6 +147,17 @@ fn a_line_is_read_below_6000_instructions() {
     assert!(counts["gcode/arc"] <= 20_000, "{counts:?}");
 }
 
+#[test]
+fn a_second_is_identified_within_2_million_instructions() {
+    let Some(counts) = counts() else { return };
+    println!("{} and {}", counts["identify/1s"], counts["identify/2s"]);
+    assert!(
+        (200_000..=2_000_000).contains(&counts["identify/1s"]),
+        "{counts:?}"
+    );
+    assert!(counts["identify/2s"] <= 6_000_000, "{counts:?}");
+}
+
 /// 170 MHz, up to 1.5 cycles an instruction.
 const INSTRUCTIONS_S: u64 = 113_000_000;
 

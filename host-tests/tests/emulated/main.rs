@@ -2,6 +2,7 @@
 
 mod firmware;
 mod homing;
+mod identification;
 mod instructions;
 mod link;
 mod same_bits;

@@ -7,6 +7,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use crate::homing::bench_arm;
+use crate::identification::plant;
 use host_tests::serial_loop::{Records, SerialLoop, with_controller};
 use planner_core::protocol::{Alarm, ERRORS};
 
@@ -418,6 +419,27 @@ const COMMANDS: &[Row] = &[
         "$H",
         &["ok"],
     ),
+    row(
+        "$ID=",
+        "identifies the mode that a move (relative, with F) excites: frequency, damping, confidence",
+        &[AT, "@accelerometer"],
+        "$ID=X40 F9600",
+        &["[ID:6.3", ",0.02", "]", "ok"],
+    ),
+    row(
+        "$ID",
+        "what was identified last",
+        &[AT, "@accelerometer", "$ID=X40 F9600"],
+        "$ID",
+        &["[ID:6.3", "ok"],
+    ),
+    row(
+        "$ID=store",
+        "makes that the prefilter's mode, and keeps it",
+        &[AT, "@accelerometer", "$ID=X40 F9600", "$ID=store"],
+        "$frequency",
+        &["=6.3", "ok"],
+    ),
     row("$SLP", "sleeps until a reset", &["$SLP"], "?", &["<Sleep|"]),
     row(
         "$RST=$",
@@ -693,6 +715,14 @@ const REFUSALS: &[Row] = &[
     row("error:79", "", &["$robot=delta"], "M101", &["error:79"]),
     row("error:80", "", NONE, "G64 P1 Q50", &["error:80"]),
     row("error:85", "", THERE, "M103 X210 Q50 R40", &["error:85"]),
+    row(
+        "error:92",
+        "",
+        THERE,
+        "$ID=X10 F9600",
+        &["[MSG:The accelerometer is silent", "error:92"],
+    ),
+    row("error:93", "", NONE, "$ID=store", &["error:93"]),
 ];
 
 const ALARMS: &[Row] = &[
@@ -827,6 +857,11 @@ fn send(desk: &mut SerialLoop<'_>, item: &str) -> String {
         ("encoders", _) => {
             desk.encoders = Some(desk.joints_at(200.0, 0.0));
             desk.run_ms(2);
+            String::new()
+        }
+        ("accelerometer", _) => {
+            desk.plant = Some(plant(6.34, 0.022, 2));
+            desk.run_ms(100);
             String::new()
         }
         ("switches", stuck) => {

@@ -4,6 +4,7 @@ mod dialect;
 mod elbow;
 mod fuzzing;
 mod homing;
+mod identification;
 mod noise;
 mod realtime;
 mod records;

@@ -4,6 +4,7 @@ use heapless::Deque;
 
 use crate::config::{ConfigError, Robot, SettingError};
 use crate::gcode::{Line, LineBuffer, Offsets, Received};
+use crate::identify::{self, Identified, Listen};
 use crate::joint_space::Space;
 use crate::motion::{MotionState, Order};
 use crate::planner::{LineError, Planner};
@@ -14,6 +15,7 @@ use super::alarm::Alarm;
 use super::cycle_start::CycleStart;
 use super::dollar::{Dollar, Restore};
 use super::homing::{self, Homing};
+use super::identification::{self, EXCITING, Identification, ModeFound};
 use super::inbox::Inbox;
 use super::overrides::{Rates, overridden};
 use super::record::{KeptText, RECORD_BYTES, Record};
@@ -36,6 +38,9 @@ const OUTS: usize = 3 * OUTS_AT_ONCE;
 // The longest ways through the controller are kept out of line, so that the texts and lines of
 // one are not on the stack while another is taken.
 
+/// The longest move of `$ID`, with the word that makes it relative.
+const JOG_BYTES: usize = 100;
+
 /// What the shell around the controller has to do next.
 #[derive(Debug)]
 pub enum Step {
@@ -49,6 +54,11 @@ pub enum Step {
     Keep(Record),
     /// Forget all records, then call [`Controller::kept`].
     ForgetRecords,
+    /// Have the accelerometer's samples recorded ([`crate::identify::Listener`]); the reports
+    /// tell how far that is.
+    Listen(Listen),
+    /// Call [`Controller::identified`] with what the record shows.
+    Identify,
     /// Nothing, until a byte comes or until this time in ms.
     Wait(Option<u64>),
 }
@@ -60,6 +70,10 @@ enum Out {
     Robot,
     Keep(Record),
     ForgetRecords,
+    Listen(Listen),
+    Identify,
+    ModeFound(ModeFound),
+    NothingFound(identify::Refusal),
     Ok,
     Error(u8),
     Alarm(Alarm),
@@ -82,6 +96,8 @@ enum Mode {
     Jogging,
     /// `$H`, by limit inputs.
     Homing,
+    /// `$ID`.
+    Identifying,
     /// `$C`.
     Checking,
     /// Locked until `$X` or `$H`.
@@ -105,6 +121,7 @@ enum AfterStop {
     Reset { alarm: Option<Alarm> },
     Stop,
     JogCancelled,
+    IdentificationCancelled,
     Alarm(Alarm),
 }
 
@@ -165,6 +182,9 @@ pub struct Controller<'q> {
     hold: Hold,
     after_stop: Option<AfterStop>,
     homing: Homing,
+    identification: Identification,
+    /// The last one that was found since the start.
+    mode_found: Option<ModeFound>,
     rates: Rates,
     cadence: Cadence,
     wishes: Wishes,
@@ -213,6 +233,8 @@ impl<'q> Controller<'q> {
             hold: Hold::None,
             after_stop: None,
             homing: Homing::new(),
+            identification: Identification::new([0.0; 3]),
+            mode_found: None,
             rates: Rates::FULL,
             cadence: Cadence::new(),
             wishes: Wishes::NONE,
@@ -327,6 +349,8 @@ impl<'q> Controller<'q> {
             Out::Robot => return Step::Robot,
             Out::Keep(record) => return Step::Keep(record),
             Out::ForgetRecords => return Step::ForgetRecords,
+            Out::Listen(listen) => return Step::Listen(listen),
+            Out::Identify => return Step::Identify,
             Out::Ok => Text::line(format_args!("ok")),
             Out::Error(code) => Text::line(format_args!("error:{code}")),
             Out::Alarm(alarm) => Text::line(format_args!("ALARM:{}", alarm.code())),
@@ -336,6 +360,11 @@ impl<'q> Controller<'q> {
             Out::LineRefused(error) => Text::line(format_args!("[MSG:{error}]")),
             Out::SettingRefused(error) => Text::line(format_args!("[MSG:{error}]")),
             Out::RobotRefused(error) => Text::line(format_args!("[MSG:{error}]")),
+            Out::ModeFound(mode) => Text::line(format_args!(
+                "[ID:{:.4},{:.5},{:.3}]",
+                mode.frequency_hz, mode.damping, mode.confidence
+            )),
+            Out::NothingFound(refusal) => Text::line(format_args!("[MSG:{refusal}]")),
             Out::NextIs(number) => Text::line(format_args!("[MSG:Next is N{number}]")),
             Out::Startup { line, code } => self.startup_answer(line, code),
         };
@@ -372,7 +401,7 @@ impl<'q> Controller<'q> {
     fn wake_ms(&self, now_ms: u64, report: &Report) -> Option<u64> {
         let waits_for_motion = self.mode == Mode::Starting
             || self.after_stop.is_some()
-            || matches!(self.mode, Mode::Jogging | Mode::Homing)
+            || matches!(self.mode, Mode::Jogging | Mode::Homing | Mode::Identifying)
             || self.startup.is_some()
             || (!self.inbox.is_empty() && self.after_stop.is_none())
             || (!self.planner.has_room() && self.cycle_start.is_waiting())
@@ -462,6 +491,7 @@ impl Controller<'_> {
     fn suspend(&mut self, hold: Hold, report: &Report) {
         match self.mode {
             Mode::Jogging => self.cancel_jog(report),
+            Mode::Identifying => self.cancel_identification(report),
             Mode::Ready if self.after_stop.is_none() => {
                 if self.hold == Hold::None && !self.is_at_rest(report) {
                     self.out(Out::Order(Order::Hold));
@@ -495,6 +525,8 @@ impl Controller<'_> {
     fn cancel_jog(&mut self, report: &Report) {
         if self.mode == Mode::Jogging && self.after_stop.is_none() {
             self.stop_motion(AfterStop::JogCancelled, report);
+        } else if self.mode == Mode::Identifying {
+            self.cancel_identification(report);
         }
     }
 
@@ -509,6 +541,7 @@ impl Controller<'_> {
                 self.stop_motion(AfterStop::Stop, report);
             }
             Mode::Homing => self.stop_homing(Alarm::HomingReset, report),
+            Mode::Identifying => self.cancel_identification(report),
             _ => {}
         }
     }
@@ -577,6 +610,9 @@ impl Controller<'_> {
         }
         if self.mode == Mode::Homing {
             return self.home_on(report);
+        }
+        if self.mode == Mode::Identifying {
+            return self.identify_on(report);
         }
         if self.mode == Mode::Jogging && self.is_at_rest(report) {
             self.mode = Mode::Ready;
@@ -680,6 +716,11 @@ impl Controller<'_> {
                 self.greet();
             }
             AfterStop::JogCancelled => self.mode = Mode::Ready,
+            AfterStop::IdentificationCancelled => {
+                self.end_identification();
+                self.out(Out::Message("The identification was cancelled"));
+                self.out(Out::Error(Refusal::NotIdentified.code()));
+            }
             AfterStop::Stop => {
                 self.mode = Mode::Ready;
                 self.out(Out::Message("Stopped"));
@@ -734,6 +775,7 @@ impl Controller<'_> {
             (Mode::Checking, _) => State::Check,
             (Mode::Jogging, _) => State::Jog,
             (Mode::Homing, _) => State::Home,
+            (Mode::Identifying, _) => State::Run,
             (_, Hold::Door) => State::Door {
                 stopping,
                 open: report.inputs.door,
@@ -785,7 +827,7 @@ impl Controller<'_> {
     fn take_line(&mut self, report: &Report) -> bool {
         if matches!(
             self.mode,
-            Mode::Starting | Mode::Homing | Mode::Critical | Mode::Asleep
+            Mode::Starting | Mode::Homing | Mode::Identifying | Mode::Critical | Mode::Asleep
         ) {
             return false;
         }
@@ -1001,6 +1043,9 @@ impl Controller<'_> {
             _ if !at_rest => self.refuse(Refusal::NotIdle),
             Dollar::Check => self.toggle_check(report),
             Dollar::Home => self.home(report),
+            Dollar::Identify(text) => self.identify(text),
+            Dollar::Identified => self.show_mode_found(),
+            Dollar::StoreIdentified => self.store_mode_found(),
             Dollar::Sleep => {
                 self.mode = Mode::Asleep;
                 self.accept();
@@ -1246,6 +1291,145 @@ impl Controller<'_> {
         }
         true
     }
+}
+
+// Identification.
+impl Controller<'_> {
+    /// Begins with the move; the answer comes at the end.
+    #[inline(never)]
+    fn identify(&mut self, text: &str) {
+        match self.mode {
+            Mode::Ready if self.hold == Hold::None => {}
+            Mode::Locked => return self.refuse(Refusal::Locked),
+            _ => return self.refuse(Refusal::NotIdle),
+        }
+        let mut jog = heapless::String::<JOG_BYTES>::new();
+        if jog.push_str("G91 ").is_err() || jog.push_str(text).is_err() {
+            return self.refuse(Refusal::LineTooLong);
+        }
+        let mut config = self.settings.robot;
+        config.prefilter = EXCITING;
+        // It has been made of these settings before, but for a prefilter that always can be.
+        let Ok(robot) = Robot::new(&config) else {
+            return self.refuse(Refusal::NoRobot);
+        };
+        self.planner.set_robot(&robot);
+        self.out(Out::Robot);
+        let start = self.target();
+        match self.planner.jog(jog.as_bytes()) {
+            Ok(accepted) if accepted.queued => {
+                let direction = start.zip(self.target()).map(direction);
+                self.identification = Identification::new(direction.unwrap_or_default());
+                self.mode = Mode::Identifying;
+                self.out(Out::Order(Order::Start));
+            }
+            Ok(_) => {
+                self.forget_robot_words();
+                self.out(Out::Message("The move excites nothing: give it a length"));
+                self.out(Out::Error(Refusal::NotIdentified.code()));
+            }
+            Err(error) => {
+                self.forget_robot_words();
+                self.out(Out::LineRefused(error));
+                self.out(Out::Error(error.code()));
+            }
+        }
+    }
+
+    /// Goes on with an identification; whether there was something to do.
+    #[inline(never)]
+    fn identify_on(&mut self, report: &Report) -> bool {
+        if report.inputs.door {
+            self.cancel_identification(report);
+            return true;
+        }
+        let stands = self.has_stopped(report);
+        let ticks = report.health.ticks;
+        match self.identification.next(ticks, stands, report.listening) {
+            identification::Next::Wait => return false,
+            identification::Next::Listen(listen) => self.out(Out::Listen(listen)),
+            identification::Next::Identify => self.out(Out::Identify),
+            identification::Next::Torn => self.not_identified(
+                "Samples of the accelerometer were lost: check its line and identify again",
+            ),
+            identification::Next::Silent => self
+                .not_identified("The accelerometer is silent: check that it answers the setpoints"),
+        }
+        true
+    }
+
+    fn not_identified(&mut self, message: &'static str) {
+        self.end_identification();
+        self.out(Out::Message(message));
+        self.out(Out::Error(Refusal::NotIdentified.code()));
+    }
+
+    /// After [`Step::Identify`]: what the record shows.
+    pub fn identified(&mut self, result: &Result<Identified, identify::Refusal>) {
+        if self.mode != Mode::Identifying {
+            return;
+        }
+        self.end_identification();
+        match result {
+            Ok(found) => {
+                self.mode_found = found.modes.first().map(|mode| ModeFound {
+                    frequency_hz: mode.frequency_hz,
+                    damping: mode.damping,
+                    confidence: mode.confidence,
+                });
+                self.show_mode_found();
+            }
+            Err(refusal) => {
+                self.out(Out::NothingFound(*refusal));
+                self.out(Out::Error(Refusal::NotIdentified.code()));
+            }
+        }
+    }
+
+    /// The prefilter of the settings is in force again.
+    fn end_identification(&mut self) {
+        self.mode = Mode::Ready;
+        self.forget_robot_words();
+    }
+
+    /// Ends an identification without a result when everything stands.
+    fn cancel_identification(&mut self, report: &Report) {
+        if self.after_stop.is_none() {
+            self.stop_motion(AfterStop::IdentificationCancelled, report);
+        }
+    }
+
+    fn show_mode_found(&mut self) {
+        match self.mode_found {
+            Some(mode) => {
+                self.out(Out::ModeFound(mode));
+                self.accept();
+            }
+            None => self.refuse(Refusal::NothingToStore),
+        }
+    }
+
+    fn store_mode_found(&mut self) {
+        let Some(mode) = self.mode_found else {
+            return self.refuse(Refusal::NothingToStore);
+        };
+        let mut settings = self.settings;
+        settings.robot.prefilter.frequency_hz = mode.frequency_hz;
+        settings.robot.prefilter.damping = mode.damping;
+        if self.adopt(&settings) {
+            self.out(Out::Keep(Record::Settings));
+            self.accept();
+        }
+    }
+}
+
+/// Direction from one pose to another, a vector of length 1; 0 if they are at the same place.
+fn direction((from, to): (Pose, Pose)) -> [f32; 3] {
+    let way = [(from.x, to.x), (from.y, to.y), (from.z, to.z)]
+        .map(|(from, to)| to.saturating_sub(from).to_num::<f32>());
+    let square: f32 = way.iter().map(|part| part * part).sum();
+    let length = crate::math::sqrt_f32(square);
+    way.map(|part| if length > 0.0 { part / length } else { 0.0 })
 }
 
 // What is kept over a restart.

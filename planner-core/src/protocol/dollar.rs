@@ -33,6 +33,12 @@ pub enum Dollar<'a> {
     Unlock,
     /// `$H`: home.
     Home,
+    /// `$ID=move`: identify the mode that a move excites, relative and with its feedrate.
+    Identify(&'a str),
+    /// `$ID`: what was identified last.
+    Identified,
+    /// `$ID=store`: that is the prefilter's mode from now on.
+    StoreIdentified,
     /// `$SLP`: sleep.
     Sleep,
     /// `$RST=$`, `$RST=#`, `$RST=*`.
@@ -84,6 +90,8 @@ impl<'a> Dollar<'a> {
             ("C", Self::Check),
             ("X", Self::Unlock),
             ("H", Self::Home),
+            ("ID", Self::Identified),
+            ("ID=store", Self::StoreIdentified),
             ("SLP", Self::Sleep),
             ("ACK", Self::Acknowledge),
             ("RST=$", Self::Restore(Restore::Settings)),
@@ -103,6 +111,7 @@ impl<'a> Dollar<'a> {
         let value = value.trim();
         match key.trim() {
             "J" | "j" => Some(Self::Jog(value)),
+            "ID" | "id" => Some(Self::Identify(value)),
             "I" | "i" => Some(Self::NameBuild(value)),
             "N0" | "n0" => Some(Self::SetStartupLine(0, value)),
             "N1" | "n1" => Some(Self::SetStartupLine(1, value)),
@@ -129,6 +138,9 @@ mod tests {
             ("N0=", Dollar::SetStartupLine(0, "")),
             ("I=left cell", Dollar::NameBuild("left cell")),
             ("I+", Dollar::MoreBuildInfo),
+            ("id", Dollar::Identified),
+            ("ID=X10 F9600", Dollar::Identify("X10 F9600")),
+            ("ID=STORE", Dollar::StoreIdentified),
             ("10", Dollar::Show("10")),
             ("frequency", Dollar::Show("frequency")),
             ("10=3", Dollar::Set("10=3")),

@@ -15,6 +15,7 @@ mod controller;
 mod cycle_start;
 mod dollar;
 mod homing;
+mod identification;
 pub mod inbox;
 mod overrides;
 mod record;

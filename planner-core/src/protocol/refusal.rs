@@ -29,6 +29,10 @@ pub enum Refusal {
     BadValue,
     /// 78: the settings would not make a robot.
     NoRobot,
+    /// 92: nothing was identified.
+    NotIdentified,
+    /// 93: nothing has been identified that could be stored.
+    NothingToStore,
 }
 
 impl Refusal {
@@ -48,6 +52,8 @@ impl Refusal {
             Self::OutOfOrder => 67,
             Self::BadValue => 77,
             Self::NoRobot => 78,
+            Self::NotIdentified => 92,
+            Self::NothingToStore => 93,
         }
     }
 }
@@ -59,7 +65,7 @@ impl fmt::Display for Refusal {
 }
 
 /// What each `error:N` means, as `$EE` lists it.
-pub const ERRORS: [(u8, &str); 52] = [
+pub const ERRORS: [(u8, &str); 54] = [
     (1, "A word begins with something other than a letter"),
     (2, "A letter has no proper number"),
     (3, "There is no such $ command or setting: see $ and $$"),
@@ -154,6 +160,8 @@ pub const ERRORS: [(u8, &str); 52] = [
         85,
         "The hop cannot be planned: check its height, rise, tolerance and acceleration",
     ),
+    (92, "Nothing was identified: see the message before"),
+    (93, "There is no mode to store: identify one with $ID first"),
 ];
 
 /// The sentence for an `error:N`.

@@ -82,7 +82,7 @@ impl Reply {
         match self.topic {
             Topic::Help => only(
                 line,
-                "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H $ES $EG $EA $EE $RST= $ACK ~ ! ? ctrl-x]",
+                "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H $ID $ES $EG $EA $EE $RST= $ACK ~ ! ? ctrl-x]",
             ),
             Topic::Settings => SETTINGS.get(line).map(|setting| known.setting(setting)),
             Topic::Setting(setting) => (line == 0).then(|| known.setting(setting)),

@@ -2,6 +2,7 @@
 
 use micromath::F32Ext;
 
+use crate::identify::Listening;
 use crate::motion::{Progress, Setpoint};
 use crate::pose::{JointPosition, Pose};
 use crate::units::TICK_HZ;
@@ -50,6 +51,8 @@ pub struct Report {
     pub inputs: Inputs,
     /// What absolute encoders read, if the board has any.
     pub encoders: Option<JointPosition>,
+    /// How far the accelerometer's record has come.
+    pub listening: Listening,
     /// How the controller fares.
     pub health: Health,
 }

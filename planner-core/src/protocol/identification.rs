@@ -1,0 +1,158 @@
+//! Identification on the robot: a move that excites the mode, and what it leaves.
+//!
+//! | phase | until | then |
+//! |---|---|---|
+//! | move | the motion stands; the accelerometer is not heeded | settle |
+//! | settle | the drives stand too, 50 ms later | listen |
+//! | listen | the record of 1 s is complete | identify |
+//!
+//! The move goes through a prefilter that leaves what it excites: a box of 10 ms, which nulls
+//! 100 Hz and bounds the acceleration. The one of the settings is in force again afterwards.
+//!
+//! Start and stop both excite. If the time between them is a whole number and a half of
+//! periods they add up, if it is a whole number they nearly cancel: a record in which nothing
+//! stands out calls for another length.
+
+use crate::identify::{Listen, Listening};
+use crate::prefilter::{Kind, PrefilterConfig};
+
+/// After the motion stands, until the record begins, in ms.
+const SETTLE_MS: u32 = 50;
+
+/// Longest wait for a sample, in ms: an accelerometer that does not answer is not there.
+const PATIENCE_MS: u32 = 3_000;
+
+/// The prefilter of the move.
+pub const EXCITING: PrefilterConfig = PrefilterConfig {
+    kind: Kind::Fir,
+    frequency_hz: 100.0,
+    damping: 0.0,
+    ..PrefilterConfig::DEFAULT
+};
+
+/// A mode as it was identified.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModeFound {
+    /// Natural frequency in Hz.
+    pub frequency_hz: f32,
+    /// Damping ratio.
+    pub damping: f32,
+    /// The probability of being right, 0 to 1.
+    pub confidence: f32,
+}
+
+/// What an identification does now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    Move,
+    /// Until this tick.
+    Settle(u32),
+    /// Until this tick at the latest, unless a sample comes.
+    Listen(u32),
+}
+
+/// What to do next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Next {
+    /// Nothing yet.
+    Wait,
+    /// Begin a record.
+    Listen(Listen),
+    /// The record is complete.
+    Identify,
+    /// Too many samples were lost.
+    Torn,
+    /// No samples come.
+    Silent,
+}
+
+/// An identification under way.
+#[derive(Clone, Copy, Debug)]
+pub struct Identification {
+    phase: Phase,
+    direction: [f32; 3],
+    /// What was heard at the last look.
+    heard: Listening,
+}
+
+impl Identification {
+    /// One whose move has this direction.
+    #[must_use]
+    pub const fn new(direction: [f32; 3]) -> Self {
+        Self {
+            phase: Phase::Move,
+            direction,
+            heard: Listening::Idle,
+        }
+    }
+
+    /// What to do next. `ticks` is how many there were since the start, `stands` says whether
+    /// the motion does.
+    pub fn next(&mut self, ticks: u32, stands: bool, listening: Listening) -> Next {
+        let is_over = |end: u32| ticks.wrapping_sub(end) <= u32::MAX / 2;
+        match self.phase {
+            Phase::Move if stands => {
+                self.phase = Phase::Settle(ticks.wrapping_add(SETTLE_MS));
+                Next::Wait
+            }
+            Phase::Settle(end) if is_over(end) => {
+                self.phase = Phase::Listen(ticks.wrapping_add(PATIENCE_MS));
+                Next::Listen(Listen {
+                    from: ticks,
+                    direction: self.direction,
+                })
+            }
+            Phase::Listen(_) if listening == Listening::Complete => Next::Identify,
+            Phase::Listen(_) if listening == Listening::Torn => Next::Torn,
+            Phase::Listen(_) if listening != self.heard => {
+                self.heard = listening;
+                self.phase = Phase::Listen(ticks.wrapping_add(PATIENCE_MS));
+                Next::Wait
+            }
+            Phase::Listen(end) if is_over(end) => Next::Silent,
+            Phase::Move | Phase::Settle(_) | Phase::Listen(_) => Next::Wait,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Just before the count of ticks wraps.
+    const START: u32 = u32::MAX - 20;
+
+    fn listening() -> (Identification, u32) {
+        let mut identification = Identification::new([0.0, 1.0, 0.0]);
+        let mut next = |ticks, stands| identification.next(ticks, stands, Listening::Idle);
+        assert_eq!(next(START, false), Next::Wait);
+        for ahead in 0..50 {
+            assert_eq!(next(START.wrapping_add(ahead), true), Next::Wait);
+        }
+        let from = START.wrapping_add(50);
+        let direction = [0.0, 1.0, 0.0];
+        assert_eq!(next(from, true), Next::Listen(Listen { from, direction }));
+        (identification, from)
+    }
+
+    #[test]
+    fn a_record_begins_when_the_drives_stand_and_ends_complete() {
+        let (mut identification, from) = listening();
+        let mut next = |progress| identification.next(from.wrapping_add(1500), true, progress);
+        assert_eq!(next(Listening::Busy(7)), Next::Wait);
+        assert_eq!(next(Listening::Torn), Next::Torn);
+        assert_eq!(next(Listening::Complete), Next::Identify);
+    }
+
+    #[test]
+    fn an_accelerometer_that_does_not_answer_is_not_awaited_for_ever() {
+        let (mut identification, from) = listening();
+        let mut after =
+            |ms, count| identification.next(from.wrapping_add(ms), true, Listening::Busy(count));
+        assert_eq!(after(10, 0), Next::Wait);
+        assert_eq!(after(3_000, 0), Next::Wait);
+        assert_eq!(after(3_005, 1), Next::Wait);
+        assert_eq!(after(6_004, 1), Next::Wait);
+        assert_eq!(after(6_005, 1), Next::Silent);
+    }
+}
