@@ -40,6 +40,7 @@ fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
     static SEGMENTS: ConstStaticCell<SegmentQueue> = ConstStaticCell::new(SegmentQueue::new());
     static FILTERS: ConstStaticCell<DelayLines> = ConstStaticCell::new(DelayLines::new());
     static CONTROLLER: StaticCell<Controller<'static>> = StaticCell::new();
+    static MOTION: StaticCell<Motion<'static>> = StaticCell::new();
     static ROBOT: StaticCell<MotionSettings> = StaticCell::new();
 
     let Board {
@@ -70,7 +71,7 @@ fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
             (used, free)
         },
     };
-    let motion = Motion::new(robot, from_planner, FILTERS.take());
+    let motion = MOTION.init(Motion::new(robot, from_planner, FILTERS.take()));
     let controller = CONTROLLER
         .init_with(|| Controller::new(Planner::new(robot, to_motion), settings, identity));
 
@@ -91,7 +92,7 @@ fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
 
 #[embassy_executor::task]
 async fn control_task(
-    motion: Motion<'static>,
+    motion: &'static mut Motion<'static>,
     link: &'static Link,
     frames: &'static Frames,
     outputs: BoardOutputs,

@@ -40,7 +40,7 @@ const PERIOD: Duration = {
 
 /// Ticks for ever.
 pub async fn run(
-    mut motion: Motion<'static>,
+    motion: &'static mut Motion<'static>,
     link: &'static Link,
     frames: &'static Frames,
     mut outputs: impl Outputs,
