@@ -153,7 +153,7 @@ impl Scenario {
                 CornerRule::ToleranceMm(mm) => mm.into(),
                 CornerRule::OverlapPercent(_) => f64::INFINITY,
             },
-            feed_window_mm: f64::from(fastest_mm_s) * robot.prefilter.length_s(),
+            feed_window_mm: f64::from(fastest_mm_s) * robot.prefilter().length_s(),
         }
     }
 }

@@ -79,7 +79,7 @@ fn the_tolerance_holds_on(seeds: std::ops::Range<u64>) {
         let parsed = Program::parse(&program).expect("the checker reads it");
         let rows = trace(&robot, &program);
         // Straight lines between rows cut where the velocity turns: at once, or within a box.
-        let cut_mm = match robot.prefilter.longest_box_s() {
+        let cut_mm = match robot.prefilter().longest_box_s() {
             None => FASTEST_MM_S * TICK_S / 2.0,
             Some(box_s) => FASTEST_MM_S * TICK_S * TICK_S / (2.0 * box_s),
         };
@@ -123,7 +123,7 @@ impl Circle {
         };
         let report = check(&parsed, &rows, &options);
         let used = report.max_path_deviation_mm / self.tolerance_mm;
-        let bound_s = TAU * self.radius_mm / bound_mm_s + robot.prefilter.length_s();
+        let bound_s = TAU * self.radius_mm / bound_mm_s + robot.prefilter().length_s();
         let slower = report.cycle_time_s / bound_s - 1.0;
         println!(
             "{kind:?}, radius {} mm, chords of {} mm to {} decimals, {} mm: {used:.3} of it used, {:.2} % slower",

@@ -175,8 +175,8 @@ pub struct Robot {
     pub follower: Option<Follower>,
     /// What the prefilter in force at the end of the path planned so far is made of.
     pub tuning: Tuning,
-    /// The prefilter in seconds.
-    pub prefilter: Prefilter,
+    /// The longest box of the prefilter in s, if it has one.
+    pub longest_box_s: Option<f32>,
     /// The prefilter in integer taps.
     pub kernel: Kernel,
     /// What an acceleration looks like from its start.
@@ -231,7 +231,7 @@ impl Robot {
             kernel: Kernel::new(&prefilter)?,
             accelerating: prefilter.response(),
             decelerating: prefilter.reversed_response(),
-            prefilter,
+            longest_box_s: longest_box_s(&prefilter),
         })
     }
 
@@ -294,18 +294,29 @@ impl Robot {
         self.limits = Limits::new(&self.config, &self.arm, &prefilter);
         self.accelerating = prefilter.response();
         self.decelerating = prefilter.reversed_response();
-        self.prefilter = prefilter;
+        self.longest_box_s = longest_box_s(&prefilter);
         self.tuning = *tuning;
+    }
+
+    /// The prefilter in seconds. It is made anew each time, to keep a robot small.
+    #[must_use]
+    pub fn prefilter(&self) -> Prefilter {
+        // one of this tuning has been made before
+        prefilter_of(&self.config, &self.arm, &self.tuning).unwrap_or(Prefilter::NONE)
     }
 
     /// The boxes that the prefilter was given because limits need them, in s.
     pub fn added_boxes_s(&self) -> impl Iterator<Item = f64> {
         let own = self.tuning.prefilter();
         let own = own.map(|own| own.boxes_s()).unwrap_or_default();
-        let all = self.prefilter.boxes_s();
+        let all = self.prefilter().boxes_s();
         all.into_iter()
             .filter(move |length_s| !own.contains(length_s))
     }
+}
+
+fn longest_box_s(prefilter: &Prefilter) -> Option<f32> {
+    prefilter.longest_box_s().map(|length_s| length_s as f32)
 }
 
 /// The prefilter of a tuning, with the boxes that the robot's limits need.

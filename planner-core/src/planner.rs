@@ -613,8 +613,8 @@ impl<'q> Planner<'q> {
             feed_mm_s: config.feed_limit_mm_s,
             yaw_deg_s: config.yaw_limit_deg_s,
         };
-        let prefilter = &self.robot.prefilter;
-        let hop = hop::plan(order.start, order.target, &wanted, &limits, prefilter);
+        let prefilter = self.robot.prefilter();
+        let hop = hop::plan(order.start, order.target, &wanted, &limits, &prefilter);
         let hop = hop.map_err(Cause::Hop)?;
         for [start, target] in hop.outline(wanted.height_mm) {
             let line = PathSegment {

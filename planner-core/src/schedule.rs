@@ -462,7 +462,7 @@ fn alone(
 /// miss a corner by `Δv T_s / 4`.
 fn dense_step(robot: &Robot, arriving: &Side, leaving: &Side, tolerance_mm: f32) -> Step {
     let spread = 2.0 * TICK / robot.accelerating.length_s().max(2.0 * TICK);
-    let jump_mm = if robot.prefilter.longest_box_s().is_none() {
+    let jump_mm = if robot.longest_box_s.is_none() {
         let feed_mm_s = arriving.feed_mm_s.max(leaving.feed_mm_s);
         turn(arriving, leaving) * feed_mm_s * TICK / 4.0
     } else {
@@ -529,9 +529,9 @@ fn solve_sampled(robot: &Robot, arriving: &Side, leaving: &Side, tolerance_mm: f
         )
     };
     let margin_mm = |change_mm_s: f32| change_mm_s * TICK / 4.0;
-    if let Some(box_s) = robot.prefilter.longest_box_s() {
+    if let Some(box_s) = robot.longest_box_s {
         let both_mm_s = arriving.feed_mm_s + leaving.feed_mm_s;
-        let share = (2.0 * TICK / box_s as f32).min(1.0);
+        let share = (2.0 * TICK / box_s).min(1.0);
         return solve(margin_mm(both_mm_s * share));
     }
     let corner = solve(0.0);

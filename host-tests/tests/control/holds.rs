@@ -68,7 +68,7 @@ fn hold_at_instants(kind: Kind, instants: usize) {
         }
     }
     let delay_s = prefilter(&robot).centroid_s();
-    let ticks_bound = (robot.prefilter.length_s() / TICK_S).ceil() as usize + 1;
+    let ticks_bound = (robot.prefilter().length_s() / TICK_S).ceil() as usize + 1;
     // from the last setpoint before the order to the first that stands
     let mm_bound = FEED_MM_S * (delay_s + TICK_S) + 1e-3;
     println!(
@@ -126,7 +126,7 @@ fn stays_on_the_path(robot: &Robot, held: &[Setpoint], context: &str) {
 ///
 /// A pure shaper lets the velocity jump, by 2F at the most.
 fn velocity_is_continuous(robot: &Robot, held: &[Setpoint], context: &str) {
-    let bound_mm_s2 = match robot.prefilter.longest_box_s() {
+    let bound_mm_s2 = match robot.prefilter().longest_box_s() {
         Some(box_s) => 2.0 * FEED_MM_S / box_s + FEED_MM_S * FEED_MM_S / RADIUS_MM,
         None => 2.0 * FEED_MM_S / TICK_S,
     };
@@ -136,7 +136,7 @@ fn velocity_is_continuous(robot: &Robot, held: &[Setpoint], context: &str) {
         found_mm_s2 <= bound_mm_s2 + RESOLUTION_MM_S2,
         "{context}: {found_mm_s2} of {bound_mm_s2} mm/s²"
     );
-    if robot.prefilter.longest_box_s().is_some() {
+    if robot.prefilter().longest_box_s().is_some() {
         for three in held.windows(3) {
             joints_follow(robot, three, bound_mm_s2, context);
         }
@@ -203,7 +203,7 @@ fn a_line_is_left_by_the_mean_delay() {
             "{kind:?}: {way_mm} of {} mm",
             FEED_MM_S * delay_s
         );
-        if let Some(box_s) = robot.prefilter.longest_box_s() {
+        if let Some(box_s) = robot.prefilter().longest_box_s() {
             let bound = FEED_MM_S / box_s;
             for three in velocities(&all).windows(2) {
                 let found = norm(sub(three[1], three[0])) / TICK_S;

@@ -89,7 +89,7 @@ fn corners_a_filter_apart(seeds: std::ops::Range<u64>) {
             config.prefilter.frequency_hz = 12.0;
         });
         // what the tool travels while the prefilter settles
-        let reach_mm = FEED_MM_S * robot.prefilter.length_s();
+        let reach_mm = FEED_MM_S * robot.prefilter().length_s();
         robot.config.corner_tolerance_mm = (reach_mm * rng.random_range(0.01..0.2)) as f32;
         let program = staircase(&mut rng, reach_mm);
         let mut orders = Orders::new();

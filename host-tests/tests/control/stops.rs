@@ -96,7 +96,7 @@ fn stop_and_go_on(robot: &Robot, stopped_at: usize) {
     assert!(is_at_rest(&end), "{context}");
 
     // Nothing jumps between the two.
-    let bound_mm_s2 = match robot.prefilter.longest_box_s() {
+    let bound_mm_s2 = match robot.prefilter().longest_box_s() {
         Some(box_s) => 2.0 * 160.0 / box_s + 160.0 * 160.0 / 45.0,
         None => 2.0 * 160.0 / TICK_S,
     };

@@ -63,7 +63,7 @@ fn scenario(seed: u64) -> (Robot, String) {
 fn keeps_the_tolerance(robot: &Robot, program: &str, setpoints: &[Setpoint], context: &str) {
     let report = report(robot, program, setpoints);
     // Without a box the velocity jumps within a tick, in which the tool moves 0.4 mm.
-    let has_box = robot.prefilter.longest_box_s().is_some();
+    let has_box = robot.prefilter().longest_box_s().is_some();
     let allowance_mm = if has_box { 1e-3 } else { 0.2 };
     let tolerance_mm = f64::from(robot.config.corner_tolerance_mm);
     for corner in &report.corners {

@@ -71,6 +71,9 @@ pub struct Prefilter {
 }
 
 impl Prefilter {
+    /// No filter.
+    pub const NONE: Self = Self { stages: Vec::new() };
+
     /// The prefilter that the settings describe: one cascade for each mode, and smoothing.
     ///
     /// # Errors

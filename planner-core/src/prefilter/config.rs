@@ -267,7 +267,7 @@ impl fmt::Display for PrefilterError {
                 "the prefilter is {length_s:.3} s long and the delay line holds 1 s: choose a shorter prefilter or a higher frequency"
             ),
             Self::TooManyKinks => f.write_str(
-                "the prefilter's response has more than 50 kinks: give fewer impulses or fewer boxes",
+                "the prefilter's response has too many kinks: give fewer impulses or fewer boxes",
             ),
         }
     }

@@ -4,9 +4,13 @@ use heapless::Vec;
 
 use super::{Impulses, Stage};
 
-/// Breakpoints of a response: FIR-3-hump-EI for each of two modes has 49. A cascade with more is
-/// refused when its taps are made; a response of 100 pieces would cost 1.4 KiB more each.
+/// Breakpoints of a response while it is made: FIR-3-hump-EI for each of two modes has 49.
 const MAX_BREAKS: usize = 50;
+
+/// Numbers of a response: begin and coefficients of each piece, up to 36 pieces with two boxes,
+/// as FIR-ZVDD for each of two modes has. A cascade with more is refused when its taps are made;
+/// room for any cascade would cost 2 KiB more each.
+const MAX_NUMBERS: usize = 36 * 5;
 
 /// Boxes of a cascade: S-curves for two modes have four.
 const MAX_BOXES: usize = 4;
@@ -31,19 +35,14 @@ const SAME_TIME_S: f64 = 1e-12;
 /// `S` and `I` below 2e-6.
 #[derive(Clone, Debug)]
 pub struct Response {
-    pieces: Vec<Piece, MAX_BREAKS>,
+    /// Piece after piece: when it begins, and the coefficients of `I` in the time since then,
+    /// highest order first.
+    pieces: Vec<f32, MAX_NUMBERS>,
+    /// Numbers of a piece.
+    stride: usize,
     length_s: f32,
     delay_s: f32,
     spread_s: f32,
-    /// More than two boxes: the coefficients of the highest orders count.
-    is_of_high_degree: bool,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Piece {
-    start_s: f32,
-    /// Coefficients of `I` in `t − start`, lowest order first.
-    ramp: [f32; COEFFICIENTS],
 }
 
 /// A term `c (t − b)₊ⁿ / n!` of the ramp response.
@@ -69,34 +68,32 @@ impl Response {
 
     /// One polynomial a piece: shift the last one to the next breakpoint, add its term.
     fn from_terms(terms: &[Term], degree: usize, spread_s: f64) -> Self {
-        let mut pieces = Vec::new();
+        let mut pieces: Vec<f32, MAX_NUMBERS> = Vec::new();
         let mut now = [0.0_f64; COEFFICIENTS];
         let mut at = 0.0;
         let factorial: f64 = (1..=degree).map(|order| order as f64).product();
-        for term in terms {
+        for (place, term) in terms.iter().enumerate() {
             shift(&mut now, term.b - at);
             at = term.b;
             if let Some(highest) = now.get_mut(degree) {
                 *highest += term.c / factorial;
             }
-            // capacity equals that of the terms, so the push cannot fail
-            let _ = pieces.push(Piece {
-                start_s: at as f32,
-                ramp: now.map(|coefficient| coefficient as f32),
-            });
-        }
-        let length_s = at;
-        let delay_s = length_s - now[0];
-        // Behind the last breakpoint the response is the raw ramp, late by the centroid.
-        if let Some(last) = pieces.last_mut() {
-            last.ramp = [now[0] as f32, 1.0, 0.0, 0.0, 0.0, 0.0];
+            if place + 1 == terms.len() {
+                // Behind the last breakpoint the response is the raw ramp, late by the centroid.
+                now = [now[0], 1.0, 0.0, 0.0, 0.0, 0.0];
+            }
+            let coefficients = now.iter().take(degree + 1).rev();
+            // of what has no room no taps are made
+            for number in core::iter::once(&at).chain(coefficients) {
+                let _ = pieces.push(*number as f32);
+            }
         }
         Self {
             pieces,
-            length_s: length_s as f32,
-            delay_s: delay_s as f32,
+            stride: stride(degree),
+            length_s: at as f32,
+            delay_s: (at - now[0]) as f32,
             spread_s: spread_s as f32,
-            is_of_high_degree: degree > 3,
         }
     }
 
@@ -123,21 +120,36 @@ impl Response {
     /// Where `S` jumps it is the limit from the right; before zero both are zero.
     #[must_use]
     pub fn at(&self, t_s: f32) -> (f32, f32) {
-        let begun = self.pieces.partition_point(|piece| piece.start_s <= t_s);
-        let Some(piece) = begun.checked_sub(1).and_then(|last| self.pieces.get(last)) else {
+        let mut begun: &[f32] = &[];
+        let (mut first, mut behind) = (0, self.pieces.len() / self.stride);
+        while first < behind {
+            let middle = usize::midpoint(first, behind);
+            let place = middle * self.stride;
+            match self.pieces.get(place..place + self.stride) {
+                Some(piece) if piece.first().is_some_and(|start_s| *start_s <= t_s) => {
+                    begun = piece;
+                    first = middle + 1;
+                }
+                _ => behind = middle,
+            }
+        }
+        let Some((start_s, coefficients)) = begun.split_first() else {
             return (0.0, 0.0);
         };
-        let t = t_s - piece.start_s;
-        let [c0, c1, c2, mut c3, c4, c5] = piece.ramp;
-        let mut bend = 3.0 * c3;
-        if self.is_of_high_degree {
-            bend += t * (4.0 * c4 + t * (5.0 * c5));
-            c3 += t * (c4 + t * c5);
+        let t = t_s - start_s;
+        // Horner's scheme, of the polynomial and of its derivative
+        let (mut ramp, mut step) = (0.0, 0.0);
+        for coefficient in coefficients {
+            step = step * t + ramp;
+            ramp = ramp * t + coefficient;
         }
-        let ramp = c0 + t * (c1 + t * (c2 + t * c3));
-        let step = c1 + t * (2.0 * c2 + t * bend);
         (step, ramp)
     }
+}
+
+/// Numbers of a piece of a response of that degree: its begin and its coefficients.
+const fn stride(degree: usize) -> usize {
+    degree + 2
 }
 
 /// How many boxes are among the stages.
@@ -148,6 +160,7 @@ pub(crate) fn boxes(stages: &[Stage]) -> usize {
 
 /// Whether a response has room for the breakpoints of a cascade.
 pub(super) fn has_room_for(stages: &[Stage]) -> bool {
+    let stride = stride(1 + boxes(stages));
     let apart: usize = stages
         .iter()
         .map(|stage| match stage {
@@ -155,8 +168,12 @@ pub(super) fn has_room_for(stages: &[Stage]) -> bool {
             Stage::Impulses(list) => list.iter().count(),
         })
         .product();
-    // not all of them need be apart; at the last place there may be one too many
-    apart <= MAX_BREAKS || terms(stages, false).len() < MAX_BREAKS
+    if apart * stride <= MAX_NUMBERS {
+        return true;
+    }
+    // not all of them need be apart; where the list is full there may be too many
+    let count = terms(stages, false).len();
+    count < MAX_BREAKS && count * stride <= MAX_NUMBERS
 }
 
 /// The terms of a cascade's ramp response, or of that run backwards.
