@@ -15,7 +15,7 @@ use planner_core::config::Robot;
 use planner_core::motion::{DelayLines, Motion, MotionSettings};
 use planner_core::planner::Planner;
 use planner_core::protocol::{Controller, Identity, Settings};
-use planner_core::queue::SegmentQueue;
+use planner_core::queue::{SegmentConsumer, SegmentProducer, SegmentQueue};
 use planner_core::store::Store;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -38,9 +38,6 @@ fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
     static LINK: StaticCell<Link> = StaticCell::new();
     static FRAMES: StaticCell<Frames> = StaticCell::new();
     static SEGMENTS: ConstStaticCell<SegmentQueue> = ConstStaticCell::new(SegmentQueue::new());
-    static FILTERS: ConstStaticCell<DelayLines> = ConstStaticCell::new(DelayLines::new());
-    static CONTROLLER: StaticCell<Controller<'static>> = StaticCell::new();
-    static MOTION: StaticCell<Motion<'static>> = StaticCell::new();
     static ROBOT: StaticCell<MotionSettings> = StaticCell::new();
 
     let Board {
@@ -57,8 +54,7 @@ fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
         setpoints,
     } = board::start();
     let settings = Settings::default();
-    let robot = Robot::new(&settings.robot);
-    let robot = &defmt::expect!(robot.ok(), "the default settings are a robot");
+    let robot = robot(&settings);
     let link: &Link = LINK.init(Link::default());
     let frames: &Frames = FRAMES.init(Frames::new());
     let (to_motion, from_planner) = SEGMENTS.take().split();
@@ -71,9 +67,8 @@ fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
             (used, free)
         },
     };
-    let motion = MOTION.init(Motion::new(robot, from_planner, FILTERS.take()));
-    let controller = CONTROLLER
-        .init_with(|| Controller::new(Planner::new(robot, to_motion), settings, identity));
+    let motion = motion(&robot, from_planner);
+    let controller = controller(planner(&robot, to_motion), settings, identity);
 
     control.spawn(defmt::unwrap!(control_task(
         motion, link, frames, outputs, arm, stopwatch, watchdog
@@ -83,11 +78,43 @@ fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
         input: command_in,
         output: command_out,
         controller,
-        robot: ROBOT.init(MotionSettings::from(robot)),
+        robot: ROBOT.init(MotionSettings::from(&robot)),
         link,
         store: defmt::expect!(Store::new(flash, board::STORE), "the store is whole pages"),
     };
     (commands, sample_in)
+}
+
+// Each made in a frame of its own, so that what is on its way to its place is on the stack
+// alone.
+
+#[inline(never)]
+fn robot(settings: &Settings) -> Robot {
+    let robot = Robot::new(&settings.robot);
+    defmt::expect!(robot.ok(), "the default settings are a robot")
+}
+
+#[inline(never)]
+fn motion(robot: &Robot, segments: SegmentConsumer<'static>) -> &'static mut Motion<'static> {
+    static FILTERS: ConstStaticCell<DelayLines> = ConstStaticCell::new(DelayLines::new());
+    static MOTION: StaticCell<Motion<'static>> = StaticCell::new();
+    MOTION.init_with(|| Motion::new(robot, segments, FILTERS.take()))
+}
+
+#[inline(never)]
+fn planner(robot: &Robot, segments: SegmentProducer<'static>) -> &'static mut Planner<'static> {
+    static PLANNER: StaticCell<Planner<'static>> = StaticCell::new();
+    PLANNER.init_with(|| Planner::new(robot, segments))
+}
+
+#[inline(never)]
+fn controller(
+    planner: &'static mut Planner<'static>,
+    settings: Settings,
+    identity: Identity,
+) -> &'static mut Controller<'static, 'static> {
+    static CONTROLLER: StaticCell<Controller<'static, 'static>> = StaticCell::new();
+    CONTROLLER.init_with(|| Controller::new(planner, settings, identity))
 }
 
 #[embassy_executor::task]

@@ -25,7 +25,7 @@ pub type Records = HashMap<Record, Vec<u8>>;
 
 /// A controller with its motion, as the firmware wires them.
 pub struct SerialLoop<'q> {
-    controller: Controller<'q>,
+    controller: Controller<'q, 'q>,
     motion: Motion<'q>,
     report: Report,
     now_ms: u64,
@@ -62,7 +62,8 @@ pub fn with_controller<R>(records: Records, body: impl FnOnce(&mut SerialLoop<'_
         blocks: LOOKAHEAD,
         stack_use: || (0, 0),
     };
-    let mut controller = Controller::new(Planner::new(&robot, producer), settings, identity);
+    let mut planner = Planner::new(&robot, producer);
+    let mut controller = Controller::new(&mut planner, settings, identity);
     for record in Record::ALL {
         if let Some(bytes) = records.get(&record) {
             controller.restore(record, bytes);

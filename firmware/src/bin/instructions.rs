@@ -338,8 +338,8 @@ impl Bench {
             blocks: 0,
             stack_use: || (0, 0),
         };
-        let planner = Planner::new(robot, producer);
-        let mut controller = Controller::new(planner, Settings::default(), identity);
+        let mut planner = Planner::new(robot, producer);
+        let mut controller = Controller::new(&mut planner, Settings::default(), identity);
         let mut motion = Motion::new(robot, consumer, filters);
         let mut report = Report::default();
         let mut served = Served::default();

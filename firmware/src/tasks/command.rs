@@ -21,7 +21,7 @@ pub struct Commands<I, O, F: NorFlash> {
     /// Where answers go.
     pub output: O,
     /// Decides.
-    pub controller: &'static mut Controller<'static>,
+    pub controller: &'static mut Controller<'static, 'static>,
     /// The place in which new settings of the robot travel to the control task and back.
     pub robot: &'static mut MotionSettings,
     /// To the control task.
@@ -88,7 +88,7 @@ pub async fn run<F: NorFlash<Error: Debug>>(commands: Commands<impl ByteIn, impl
 
 /// Gives the controller what has outlasted power-off. What cannot be read is erased.
 async fn restore<F: NorFlash<Error: Debug>>(
-    controller: &mut Controller<'_>,
+    controller: &mut Controller<'_, '_>,
     store: &mut Store<F>,
     memory: &mut Buffer,
 ) {

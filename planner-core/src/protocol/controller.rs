@@ -169,8 +169,8 @@ enum Sequence {
 /// Bytes go in with [`Controller::receive`]; [`Controller::step`] says, one thing at a time,
 /// what to send, to order and to keep. It never blocks, and time is an argument, so that the
 /// same code runs on the microcontroller, in tests and under fuzzing.
-pub struct Controller<'q> {
-    planner: Planner<'q>,
+pub struct Controller<'c, 'q> {
+    planner: &'c mut Planner<'q>,
     settings: Settings,
     identity: Identity,
     lines: LineBuffer,
@@ -216,10 +216,10 @@ pub struct Identity {
     pub stack_use: fn() -> (usize, usize),
 }
 
-impl<'q> Controller<'q> {
+impl<'c, 'q> Controller<'c, 'q> {
     /// A controller that has heard nothing, with the default settings in force.
     #[must_use]
-    pub const fn new(planner: Planner<'q>, settings: Settings, identity: Identity) -> Self {
+    pub const fn new(planner: &'c mut Planner<'q>, settings: Settings, identity: Identity) -> Self {
         Self {
             planner,
             settings,
@@ -421,7 +421,7 @@ impl<'q> Controller<'q> {
 }
 
 // Realtime commands.
-impl Controller<'_> {
+impl Controller<'_, '_> {
     /// Notes what a realtime byte asks for. A reset and a stop also forget the lines before
     /// them, and only those.
     fn wish(&mut self, byte: u8) {
@@ -594,7 +594,7 @@ impl Controller<'_> {
 }
 
 // What happens by itself.
-impl Controller<'_> {
+impl Controller<'_, '_> {
     /// Looks at what the motion and the inputs do; whether there was something to do.
     fn watch(&mut self, now_ms: u64, report: &Report) -> bool {
         if self.mode == Mode::Starting {
@@ -822,7 +822,7 @@ impl Controller<'_> {
 }
 
 // Lines.
-impl Controller<'_> {
+impl Controller<'_, '_> {
     /// Takes the next line, if it may be answered now.
     fn take_line(&mut self, report: &Report) -> bool {
         if matches!(
@@ -1011,7 +1011,7 @@ impl Controller<'_> {
 }
 
 // `$` commands.
-impl Controller<'_> {
+impl Controller<'_, '_> {
     #[inline(never)]
     fn dollar(&mut self, command: &[u8], report: &Report) {
         let command = core::str::from_utf8(command).ok().and_then(Dollar::parse);
@@ -1294,7 +1294,7 @@ impl Controller<'_> {
 }
 
 // Identification.
-impl Controller<'_> {
+impl Controller<'_, '_> {
     /// Begins with the move; the answer comes at the end.
     #[inline(never)]
     fn identify(&mut self, text: &str) {
@@ -1433,7 +1433,7 @@ fn direction((from, to): (Pose, Pose)) -> [f32; 3] {
 }
 
 // What is kept over a restart.
-impl Controller<'_> {
+impl Controller<'_, '_> {
     /// Takes a record that was kept. Before the first step.
     pub fn restore(&mut self, record: Record, bytes: &[u8]) {
         match record {
