@@ -198,13 +198,15 @@ impl<'q> Schedule<'q> {
         });
         self.note(robot, &passage, duration_s as f32);
         self.previous = Some(side(last_tangent, duration_s));
+        // a stop that limits ask for may be longer than the filter
+        let overlap = (settled - passage.dwell).max(0).min(settled - stop);
         let segment = RawSegment {
-            overlap: (settled - passage.dwell).max(0),
+            overlap,
             pace: timing.pace,
             line,
             ..RawSegment::new(path, duration_s)
         };
-        let passed = passage.dwell.min(settled) + segment.duration;
+        let passed = settled - overlap + segment.duration;
         self.busy -= passed;
         if on_the_way.is_some() {
             // the filter of what comes has seen this line only
@@ -218,7 +220,7 @@ impl<'q> Schedule<'q> {
             Rate::ONE
         };
         if let Some((course, choice)) = &limited {
-            let dwell_s = seconds(passage.dwell.min(settled));
+            let dwell_s = seconds(settled - overlap);
             let shortest_s = seconds(top_rate.real(segment.duration.min(ONE_TICK << 13)));
             self.run.take(limits, course, choice, dwell_s, shortest_s);
         }
