@@ -124,14 +124,16 @@ impl RecordFile {
             ));
         };
         let step_s = (last_s - first_s) / (samples.len() - 1) as f64;
+        // first of all, because the mean step means nothing where the order is wrong
+        let standing = samples.windows(2).position(|pair| pair[1].0 <= pair[0].0);
+        if let Some(at) = standing {
+            return Err(refused(
+                lines[at + 1],
+                "the time does not go on: put the samples in order".into(),
+            ));
+        }
         for (at, (pair, line)) in samples.windows(2).zip(&lines[1..]).enumerate() {
             let step = pair[1].0 - pair[0].0;
-            if step <= 0.0 {
-                return Err(refused(
-                    *line,
-                    "the time does not go on: put the samples in order".into(),
-                ));
-            }
             let place = first_s + (at + 1) as f64 * step_s;
             let is_even = (step - step_s).abs() <= UNEVEN * step_s
                 && (pair[1].0 - place).abs() <= UNEVEN * step_s;

@@ -100,7 +100,7 @@ fn exact_stops_leave_every_sample_on_the_path() {
     for run in &*IDEAL_STOPS {
         let (kind, report) = (run.prefilter, report(run));
         assert!(report.max_path_deviation_mm < 1e-3, "{kind:?} {report:?}");
-        let smooth = matches!(kind, Kind::Fir | Kind::FirZv | Kind::FirZvd | Kind::SCurve);
+        let smooth = matches!(kind, Kind::Fir | Kind::FirZv | Kind::FirZvd);
         let cut_mm = if smooth { 1e-3 } else { CUT_MM };
         assert!(report.max_corner_error_mm() < cut_mm, "{kind:?} {report:?}");
         assert_eq!((report.drift_mm, report.drift_deg), (0.0, 0.0));

@@ -12,7 +12,8 @@ const PAGE: usize = 2048;
 const PAGES: usize = 4;
 const WORD: usize = 8;
 
-/// A NOR flash as in the STM32G4: 8-byte words that are written once, 2 KiB pages.
+/// A NOR flash as in the STM32G4: 8-byte words, 2 KiB pages. A word is written once, and once
+/// more if that makes it zero (RM0440, PROGERR of the flash's status register).
 #[derive(Clone)]
 struct Flash {
     bytes: Vec<u8>,
@@ -102,7 +103,7 @@ impl NorFlash for Flash {
             let at = offset as usize + i * WORD;
             let place = &mut self.bytes[at..at + WORD];
             assert!(
-                place.iter().all(|byte| *byte == 0xFF),
+                place.iter().all(|byte| *byte == 0xFF) || word.iter().all(|byte| *byte == 0),
                 "a word is written twice"
             );
             let length = if whole {
