@@ -11,7 +11,7 @@ use firmware::tasks::command::Commands;
 use firmware::tasks::control::Frames;
 use firmware::tasks::link::Link;
 use firmware::tasks::{command, control, samples, setpoints};
-use planner_core::config::Robot;
+use planner_core::config::{self, Robot};
 use planner_core::motion::{DelayLines, Motion, MotionSettings};
 use planner_core::planner::Planner;
 use planner_core::protocol::{Controller, Identity, Settings};
@@ -99,10 +99,9 @@ fn robot(settings: &Settings) -> &'static mut Robot {
 #[inline(never)]
 fn unfiltered_robot(settings: &Settings) -> &'static mut Robot {
     static ROBOT: StaticCell<Robot> = StaticCell::new();
-    match Robot::unfiltered(&settings.robot) {
-        Ok(robot) => ROBOT.init(robot),
-        Err(_) => defmt::panic!("the default settings are no robot"),
-    }
+    let arm = config::arm(&settings.robot);
+    let arm = defmt::expect!(arm.ok(), "the default settings have an arm");
+    ROBOT.init_with(|| Robot::unfiltered(&settings.robot, arm))
 }
 
 #[inline(never)]

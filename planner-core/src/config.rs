@@ -193,21 +193,17 @@ impl Robot {
     /// # Errors
     /// [`ConfigError`] names the first setting that is out of range.
     pub fn new(config: &RobotConfig) -> Result<Self, ConfigError> {
-        let mut robot = Self::unfiltered(config)?;
+        check_ranges(config)?;
+        let mut robot = Self::unfiltered(config, arm(config)?);
         robot.set_config(config)?;
         Ok(robot)
     }
 
-    /// A robot of these settings that has no prefilter yet. [`Robot::set_config`] completes it
-    /// where it stays, so that the stack never holds a robot and what it is made of.
-    ///
-    /// # Errors
-    /// [`ConfigError`] names the first setting that is out of range, but for the prefilter's.
-    #[inline(never)]
-    pub fn unfiltered(config: &RobotConfig) -> Result<Self, ConfigError> {
-        check_ranges(config)?;
-        let arm = arm(config)?;
-        Ok(Self {
+    /// A robot of these settings and this arm that has no prefilter yet. [`Robot::set_config`]
+    /// completes it where it stays, so that the stack never holds a robot and what it is made of.
+    #[must_use]
+    pub fn unfiltered(config: &RobotConfig, arm: Arm) -> Self {
+        Self {
             config: *config,
             limits: Limits::new(config, &arm, &Prefilter::NONE),
             arm,
@@ -217,7 +213,7 @@ impl Robot {
             accelerating: Response::NONE,
             decelerating: Response::NONE,
             longest_box_s: None,
-        })
+        }
     }
 
     /// Changes all settings, each part in its place.
@@ -226,17 +222,26 @@ impl Robot {
     /// [`ConfigError`] names the first setting that is out of range; nothing is changed then.
     #[inline(never)]
     pub fn set_config(&mut self, config: &RobotConfig) -> Result<(), ConfigError> {
+        let tuning = self.take_config(config)?;
+        // its taps have been made before: this does not fail
+        self.tune(&tuning)?;
+        Ok(())
+    }
+
+    /// Changes all settings but the prefilter, and yields what that is to be made of.
+    #[inline(never)]
+    fn take_config(&mut self, config: &RobotConfig) -> Result<Tuning, ConfigError> {
         check_ranges(config)?;
         let arm = arm(config)?;
-        let follower = follower(config)?;
-        let tuning = first_tuning(config, follower.as_ref());
+        let mut follower = None;
+        make_follower(&mut follower, config, &config.prefilter, config.automatic)?;
+        let tuning = first_tuning(&config.prefilter, follower.as_ref());
         check_tuning(config, &arm, &tuning)?;
         // nothing fails from here on
         self.config = *config;
         self.arm = arm;
         self.follower = follower;
-        self.tune(&tuning)?;
-        Ok(())
+        Ok(tuning)
     }
 
     /// Changes the side of a SCARA's elbow.
@@ -253,9 +258,9 @@ impl Robot {
     #[inline(never)]
     pub fn set_prefilter(&mut self, config: &PrefilterConfig) -> Result<(), ConfigError> {
         let stays_automatic = self.stays_automatic(config);
-        let follower = follower_by(&self.config, config, stays_automatic)?;
-        let named = Tuning::Named(*config);
-        self.tune(&follower.as_ref().map_or(named, Follower::slowest))?;
+        let mut follower = None;
+        make_follower(&mut follower, &self.config, config, stays_automatic)?;
+        self.tune(&first_tuning(config, follower.as_ref()))?;
         self.follower = follower;
         self.config.prefilter = *config;
         self.config.automatic = stays_automatic;
@@ -276,8 +281,10 @@ impl Robot {
     /// What the prefilter is made of at first, once its settings are these.
     #[inline(never)]
     fn first_tuning_by(&self, config: &PrefilterConfig) -> Result<Tuning, ConfigError> {
-        let follower = follower_by(&self.config, config, self.stays_automatic(config))?;
-        Ok(follower.map_or(Tuning::Named(*config), |follower| follower.slowest()))
+        let mut follower = None;
+        let stays_automatic = self.stays_automatic(config);
+        make_follower(&mut follower, &self.config, config, stays_automatic)?;
+        Ok(first_tuning(config, follower.as_ref()))
     }
 
     fn stays_automatic(&self, config: &PrefilterConfig) -> bool {
@@ -345,8 +352,12 @@ fn check_taps(tuning: &Tuning) -> Result<(), PrefilterError> {
     Kernel::new(&prefilter).map(drop)
 }
 
+/// The arm that the settings describe.
+///
+/// # Errors
+/// [`ConfigError`] names the first setting of the arm that is out of range.
 #[inline(never)]
-fn arm(config: &RobotConfig) -> Result<Arm, ConfigError> {
+pub fn arm(config: &RobotConfig) -> Result<Arm, ConfigError> {
     Ok(match config.arm {
         ArmKind::Scara => Arm::Scara(Scara::new(&config.scara)?),
         ArmKind::Delta => Arm::Delta(Delta::new(&config.delta)?),
@@ -434,19 +445,17 @@ const fn limit_names(part: Part) -> &'static [&'static str; 3] {
     }
 }
 
-/// What chooses the prefilters of each move, if there is a map or a choice.
-fn follower(config: &RobotConfig) -> Result<Option<Follower>, ConfigError> {
-    follower_by(config, &config.prefilter, config.automatic)
-}
-
-/// The same with other settings of the prefilter.
-fn follower_by(
+/// Makes what chooses the prefilters of each move, if there is a map or a choice, for these
+/// settings of the prefilter instead of the robot's own.
+#[inline(never)]
+fn make_follower(
+    place: &mut Option<Follower>,
     config: &RobotConfig,
     prefilter: &PrefilterConfig,
     automatic: bool,
-) -> Result<Option<Follower>, ConfigError> {
+) -> Result<(), ConfigError> {
     if !config.map.is_complete() && !automatic {
-        return Ok(None);
+        return Ok(());
     }
     let (frequency_hz, damping) = (prefilter.frequency_hz, prefilter.damping);
     let everywhere;
@@ -462,15 +471,12 @@ fn follower_by(
         shortest: automatic.then_some(config.shortest),
         method: config.posture_method,
     };
-    match Follower::new(&follow) {
-        Ok(follower) => Ok(Some(follower)),
-        Err(error) => Err(ConfigError::Follow(error)),
-    }
+    Follower::make(place, &follow).map_err(ConfigError::Follow)
 }
 
 /// What the prefilter is made of before the first move.
-fn first_tuning(config: &RobotConfig, follower: Option<&Follower>) -> Tuning {
-    follower.map_or(Tuning::Named(config.prefilter), Follower::slowest)
+fn first_tuning(config: &PrefilterConfig, follower: Option<&Follower>) -> Tuning {
+    follower.map_or(Tuning::Named(*config), Follower::slowest)
 }
 
 /// Why a `name=value` setting is refused.

@@ -212,24 +212,48 @@ pub struct Follower {
 const SLACK_TICKS: f64 = 12.0;
 
 impl Follower {
-    /// Validates the settings. A filter for any mode of the map then fits half the delay line.
+    /// Validates the settings, and makes the follower in its place. A filter for any mode of the
+    /// map then fits half the delay line.
     ///
     /// # Errors
-    /// [`FollowError`] says what cannot be followed.
-    pub fn new(config: &FollowConfig<'_>) -> Result<Self, FollowError> {
-        let map = ModeMap::new(config.map).map_err(FollowError::Map)?;
-        let source = match (config.method, config.shortest) {
-            (PostureMethod::Local, None) => Source::Named(config.prefilter),
+    /// [`FollowError`] says what cannot be followed; the place is of no use then.
+    pub(crate) fn make(
+        place: &mut Option<Self>,
+        config: &FollowConfig<'_>,
+    ) -> Result<(), FollowError> {
+        check_map(config.map)?;
+        // with as little as can be on the stack, because it looks at many prefilters
+        let shortest = match (config.method, config.shortest) {
             (PostureMethod::Local, Some(shortest)) => {
                 let modes = config.map.used().iter().map(Mode::from);
-                let found = Shortest::new(modes, &shortest).map_err(FollowError::Shortest)?;
-                Source::Shortest(found, config.prefilter)
+                let found = Shortest::new(modes, &shortest);
+                Some(found.map_err(FollowError::Shortest)?)
             }
-            (method, _) => Source::Boxes(method),
+            _ => None,
         };
-        let follower = Self { map, source };
-        check_length(&follower.slowest())?;
-        Ok(follower)
+        Self::put(place, config, shortest)?;
+        place
+            .as_ref()
+            .map_or(Ok(()), |follower| check_length(&follower.slowest()))
+    }
+
+    #[inline(never)]
+    fn put(
+        place: &mut Option<Self>,
+        config: &FollowConfig<'_>,
+        shortest: Option<Shortest>,
+    ) -> Result<(), FollowError> {
+        *place = Some(Self {
+            map: ModeMap::new(config.map).map_err(FollowError::Map)?,
+            source: match (config.method, shortest) {
+                (PostureMethod::Local, None) => Source::Named(config.prefilter),
+                (PostureMethod::Local, Some(shortest)) => {
+                    Source::Shortest(shortest, config.prefilter)
+                }
+                (method, _) => Source::Boxes(method),
+            },
+        });
+        Ok(())
     }
 
     /// A tuning for the map's slowest mode: the longest prefilter that a move can get.
@@ -313,6 +337,11 @@ impl fmt::Display for Follower {
             ),
         }
     }
+}
+
+#[inline(never)]
+fn check_map(config: &ModeMapConfig) -> Result<(), FollowError> {
+    ModeMap::new(config).map(drop).map_err(FollowError::Map)
 }
 
 /// Whether two prefilters of a tuning fit the delay line. Not inlined, so that none is on the
