@@ -11,7 +11,7 @@ use firmware::tasks::command::Commands;
 use firmware::tasks::control::Frames;
 use firmware::tasks::link::Link;
 use firmware::tasks::{command, control, samples, setpoints};
-use planner_core::config::Robot;
+use planner_core::config::{self, Robot};
 use planner_core::motion::{DelayLines, Motion, MotionSettings};
 use planner_core::planner::Planner;
 use planner_core::protocol::{Controller, Identity, Settings};
@@ -38,7 +38,7 @@ fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
     static LINK: StaticCell<Link> = StaticCell::new();
     static FRAMES: StaticCell<Frames> = StaticCell::new();
     static SEGMENTS: ConstStaticCell<SegmentQueue> = ConstStaticCell::new(SegmentQueue::new());
-    static ROBOT: StaticCell<MotionSettings> = StaticCell::new();
+    static SETTINGS: StaticCell<MotionSettings> = StaticCell::new();
 
     let Board {
         command_in,
@@ -54,7 +54,6 @@ fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
         setpoints,
     } = board::start();
     let settings = Settings::default();
-    let robot = robot(&settings);
     let link: &Link = LINK.init(Link::default());
     let frames: &Frames = FRAMES.init(Frames::new());
     let (to_motion, from_planner) = SEGMENTS.take().split();
@@ -67,8 +66,10 @@ fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
             (used, free)
         },
     };
-    let motion = motion(&robot, from_planner);
-    let controller = controller(planner(&robot, to_motion), settings, identity);
+    let robot = robot(&settings);
+    let motion = motion(robot, from_planner);
+    let motion_settings = SETTINGS.init_with(|| MotionSettings::from(&*robot));
+    let controller = controller(planner(robot, to_motion), settings, identity);
 
     control.spawn(defmt::unwrap!(control_task(
         motion, link, frames, outputs, arm, stopwatch, watchdog
@@ -78,7 +79,7 @@ fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
         input: command_in,
         output: command_out,
         controller,
-        robot: ROBOT.init(MotionSettings::from(&robot)),
+        robot: motion_settings,
         link,
         store: defmt::expect!(Store::new(flash, board::STORE), "the store is whole pages"),
     };
@@ -88,10 +89,19 @@ fn start() -> (Commands<CommandIn, CommandOut, BoardFlash>, SampleIn) {
 // Each made in a frame of its own, so that what is on its way to its place is on the stack
 // alone.
 
+fn robot(settings: &Settings) -> &'static mut Robot {
+    let robot = unfiltered_robot(settings);
+    let made = robot.set_config(&settings.robot);
+    defmt::expect!(made.ok(), "the default settings are a robot");
+    robot
+}
+
 #[inline(never)]
-fn robot(settings: &Settings) -> Robot {
-    let robot = Robot::new(&settings.robot);
-    defmt::expect!(robot.ok(), "the default settings are a robot")
+fn unfiltered_robot(settings: &Settings) -> &'static mut Robot {
+    static ROBOT: StaticCell<Robot> = StaticCell::new();
+    let arm = config::arm(&settings.robot);
+    let arm = defmt::expect!(arm.ok(), "the default settings have an arm");
+    ROBOT.init_with(|| Robot::unfiltered(&settings.robot, arm))
 }
 
 #[inline(never)]
@@ -102,7 +112,7 @@ fn motion(robot: &Robot, segments: SegmentConsumer<'static>) -> &'static mut Mot
 }
 
 #[inline(never)]
-fn planner(robot: &Robot, segments: SegmentProducer<'static>) -> &'static mut Planner<'static> {
+fn planner(robot: &'static mut Robot, segments: SegmentProducer<'static>) -> &'static mut Planner<'static> {
     static PLANNER: StaticCell<Planner<'static>> = StaticCell::new();
     PLANNER.init_with(|| Planner::new(robot, segments))
 }

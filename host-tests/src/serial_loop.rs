@@ -54,7 +54,7 @@ pub fn with_controller<R>(records: Records, body: impl FnOnce(&mut SerialLoop<'_
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
     let settings = Settings::default();
-    let robot = Robot::new(&settings.robot).expect("the default settings are a robot");
+    let mut robot = Robot::new(&settings.robot).expect("the default settings are a robot");
     let (producer, consumer) = queue.split();
     let identity = Identity {
         board: "PC",
@@ -62,7 +62,8 @@ pub fn with_controller<R>(records: Records, body: impl FnOnce(&mut SerialLoop<'_
         blocks: LOOKAHEAD,
         stack_use: || (0, 0),
     };
-    let mut planner = Planner::new(&robot, producer);
+    let motion = Motion::new(&robot, consumer, &mut filters);
+    let mut planner = Planner::new(&mut robot, producer);
     let mut controller = Controller::new(&mut planner, settings, identity);
     for record in Record::ALL {
         if let Some(bytes) = records.get(&record) {
@@ -71,7 +72,7 @@ pub fn with_controller<R>(records: Records, body: impl FnOnce(&mut SerialLoop<'_
     }
     let mut serial_loop = SerialLoop {
         controller,
-        motion: Motion::new(&robot, consumer, &mut filters),
+        motion,
         report: Report::default(),
         now_ms: 0,
         output: Vec::new(),

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use planner_core::config::Robot;
+use planner_core::config::{ConfigError, Robot, RobotConfig};
 use planner_core::limits::Limited;
 use planner_core::motion::{DelayLines, Motion, MotionState, Order, Setpoint};
 use planner_core::planner::{LineError, Planner};
@@ -52,7 +52,8 @@ pub fn limited_feeds(robot: &Robot, program: &str) -> Result<Vec<Limited>, Progr
     let mut limited = Vec::new();
     let mut queue = SegmentQueue::new();
     let (producer, mut consumer) = queue.split();
-    let mut planner = Planner::new(robot, producer);
+    let mut planned = robot.clone();
+    let mut planner = Planner::new(&mut planned, producer);
     let mut moves = false;
     for line in program.lines() {
         let accepted = planner.line(line.as_bytes())?;
@@ -81,7 +82,7 @@ pub fn run(robot: &Robot, program: &str, each: impl FnMut(&Setpoint)) -> Result<
     check(robot, program)?;
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
-    Controller::new(robot, &mut queue, &mut filters).run(program, each)?;
+    Controller::new(&mut robot.clone(), &mut queue, &mut filters).run(program, each)?;
     Ok(())
 }
 
@@ -94,18 +95,26 @@ pub struct Controller<'q> {
 
 impl<'q> Controller<'q> {
     /// A controller that has seen no line, around a queue and delay lines that are new.
-    pub fn new(robot: &Robot, queue: &'q mut SegmentQueue, filters: &'q mut DelayLines) -> Self {
+    pub fn new(
+        robot: &'q mut Robot,
+        queue: &'q mut SegmentQueue,
+        filters: &'q mut DelayLines,
+    ) -> Self {
         let (producer, consumer) = queue.split();
         Self {
-            planner: Planner::new(robot, producer),
             motion: Motion::new(robot, consumer, filters),
+            planner: Planner::new(robot, producer),
         }
     }
 
     /// Changes the settings, between two programs.
-    pub fn set_robot(&mut self, robot: &Robot) {
-        self.planner.set_robot(robot);
-        self.motion.set_robot(&robot.into());
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first setting that is out of range; nothing is changed then.
+    pub fn set_config(&mut self, config: &RobotConfig) -> Result<(), ConfigError> {
+        self.planner.set_config(config)?;
+        self.motion.set_robot(&self.planner.robot().into());
+        Ok(())
     }
 
     /// The planner, for what no line says.

@@ -393,7 +393,7 @@ fn no_limit_is_passed_with_holds_and_overrides() {
                 rapid_percent: [25, 50, 100][rng.random_range(0..3)],
             })
         };
-        Controller::new(&robot, &mut queue, &mut filters)
+        Controller::new(&mut robot.clone(), &mut queue, &mut filters)
             .run_with_orders(&program, order, |setpoint| all.push(*setpoint))
             .expect("the program runs");
         assert_kept(

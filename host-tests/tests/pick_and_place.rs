@@ -176,7 +176,7 @@ fn command(robot: &Robot, program: &str, meanwhile: Meanwhile) -> Vec<TraceRow> 
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
     let mut rows = Vec::new();
-    Controller::new(robot, &mut queue, &mut filters)
+    Controller::new(&mut robot.clone(), &mut queue, &mut filters)
         .run_with_orders(
             program,
             |tick| match meanwhile {
@@ -312,7 +312,8 @@ fn a_hop_that_cannot_be_driven_is_refused() {
     ] {
         let mut queue = SegmentQueue::new();
         let mut filters = Box::new(DelayLines::new());
-        let mut controller = Controller::new(&robot, &mut queue, &mut filters);
+        let mut planned = robot.clone();
+        let mut controller = Controller::new(&mut planned, &mut queue, &mut filters);
         controller.planner().line(b"G0 X-350 Y0 Z-767").unwrap();
         let error = controller.planner().line(line.as_bytes()).unwrap_err();
         assert_eq!(error.code(), code, "{line}: {error}");

@@ -7,7 +7,7 @@ use crate::hop::{HopAxes, HopConfig, HopError};
 use crate::kinematics::{
     Arm, ArmKind, Delta, DeltaConfig, DeltaError, Elbow, JointRange, Scara, ScaraConfig, ScaraError,
 };
-use crate::limits::{Limits, LimitsConfig, MotionLimits, Part, with_boxes};
+use crate::limits::{Limits, LimitsConfig, MotionLimits, Part, add_boxes};
 use crate::pose::AXES;
 use crate::posture::{
     FollowConfig, FollowError, Follower, MapNode, ModeMapConfig, PostureMethod, ShortestConfig,
@@ -193,46 +193,55 @@ impl Robot {
     /// # Errors
     /// [`ConfigError`] names the first setting that is out of range.
     pub fn new(config: &RobotConfig) -> Result<Self, ConfigError> {
-        let checks = [
-            ("tolerance", config.corner_tolerance_mm, 0.0, 100.0),
-            ("overlap", config.corner_overlap_percent, 0.0, 100.0),
-            ("rapid", config.rapid_mm_s, 0.001, 10_000.0),
-            ("feed-limit", config.feed_limit_mm_s, 0.001, 10_000.0),
-            ("yaw-limit", config.yaw_limit_deg_s, 0.001, 10_000.0),
-            ("joint-speed", config.joint_speed_deg_s, 0.001, 10_000.0),
-            ("uncertainty", config.shortest.uncertainty, 0.0, 0.5),
-            ("residual-limit", config.shortest.limit, 0.001, 1.0),
-        ];
-        for (name, value, low, high) in checks {
-            if !(low..=high).contains(&value) {
-                return Err(ConfigError::Range {
-                    name,
-                    value,
-                    low,
-                    high,
-                });
-            }
-        }
-        config.hop.check()?;
-        check_limits(config)?;
-        let arm = match config.arm {
-            ArmKind::Scara => Arm::Scara(Scara::new(&config.scara)?),
-            ArmKind::Delta => Arm::Delta(Delta::new(&config.delta)?),
-        };
-        let follower = follower(config)?;
-        let tuning = first_tuning(config, follower.as_ref());
-        let prefilter = prefilter_of(config, &arm, &tuning)?;
-        Ok(Self {
+        check_ranges(config)?;
+        let mut robot = Self::unfiltered(config, arm(config)?);
+        robot.set_config(config)?;
+        Ok(robot)
+    }
+
+    /// A robot of these settings and this arm that has no prefilter yet. [`Robot::set_config`]
+    /// completes it where it stays, so that the stack never holds a robot and what it is made of.
+    #[must_use]
+    pub fn unfiltered(config: &RobotConfig, arm: Arm) -> Self {
+        Self {
             config: *config,
-            limits: Limits::new(config, &arm, &prefilter),
+            limits: Limits::new(config, &arm, &Prefilter::NONE),
             arm,
-            follower,
-            tuning,
-            kernel: Kernel::new(&prefilter)?,
-            accelerating: prefilter.response(),
-            decelerating: prefilter.reversed_response(),
-            longest_box_s: longest_box_s(&prefilter),
-        })
+            follower: None,
+            tuning: Tuning::Named(config.prefilter),
+            kernel: Kernel::NONE,
+            accelerating: Response::NONE,
+            decelerating: Response::NONE,
+            longest_box_s: None,
+        }
+    }
+
+    /// Changes all settings, each part in its place.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first setting that is out of range; nothing is changed then.
+    #[inline(never)]
+    pub fn set_config(&mut self, config: &RobotConfig) -> Result<(), ConfigError> {
+        let tuning = self.take_config(config)?;
+        // its taps have been made before: this does not fail
+        self.tune(&tuning)?;
+        Ok(())
+    }
+
+    /// Changes all settings but the prefilter, and yields what that is to be made of.
+    #[inline(never)]
+    fn take_config(&mut self, config: &RobotConfig) -> Result<Tuning, ConfigError> {
+        check_ranges(config)?;
+        let arm = arm(config)?;
+        let mut follower = None;
+        make_follower(&mut follower, config, &config.prefilter, config.automatic)?;
+        let tuning = first_tuning(&config.prefilter, follower.as_ref());
+        check_tuning(config, &arm, &tuning)?;
+        // nothing fails from here on
+        self.config = *config;
+        self.arm = arm;
+        self.follower = follower;
+        Ok(tuning)
     }
 
     /// Changes the side of a SCARA's elbow.
@@ -246,12 +255,15 @@ impl Robot {
     ///
     /// # Errors
     /// [`ConfigError`] names the value that is out of range; nothing is changed then.
+    #[inline(never)]
     pub fn set_prefilter(&mut self, config: &PrefilterConfig) -> Result<(), ConfigError> {
-        let changed = self.with_prefilter(config);
-        let follower = follower(&changed)?;
-        self.tune(&first_tuning(&changed, follower.as_ref()))?;
+        let stays_automatic = self.stays_automatic(config);
+        let mut follower = None;
+        make_follower(&mut follower, &self.config, config, stays_automatic)?;
+        self.tune(&first_tuning(config, follower.as_ref()))?;
         self.follower = follower;
-        self.config = changed;
+        self.config.prefilter = *config;
+        self.config.automatic = stays_automatic;
         Ok(())
     }
 
@@ -262,47 +274,47 @@ impl Robot {
     /// As [`Robot::set_prefilter`].
     #[inline(never)]
     pub fn check_prefilter(&self, config: &PrefilterConfig) -> Result<(), ConfigError> {
-        let changed = self.with_prefilter(config);
-        let follower = follower(&changed)?;
-        let prefilter = first_tuning(&changed, follower.as_ref()).prefilter()?;
-        Kernel::new(&prefilter)?;
+        check_taps(&self.first_tuning_by(config)?)?;
         Ok(())
     }
 
-    fn with_prefilter(&self, config: &PrefilterConfig) -> RobotConfig {
-        RobotConfig {
-            prefilter: *config,
-            automatic: self.config.automatic && config.kind == self.config.prefilter.kind,
-            ..self.config
-        }
+    /// What the prefilter is made of at first, once its settings are these.
+    #[inline(never)]
+    fn first_tuning_by(&self, config: &PrefilterConfig) -> Result<Tuning, ConfigError> {
+        let mut follower = None;
+        let stays_automatic = self.stays_automatic(config);
+        make_follower(&mut follower, &self.config, config, stays_automatic)?;
+        Ok(first_tuning(config, follower.as_ref()))
+    }
+
+    fn stays_automatic(&self, config: &PrefilterConfig) -> bool {
+        self.config.automatic && config.kind == self.config.prefilter.kind
     }
 
     /// Goes on with a prefilter of this tuning.
     ///
     /// # Errors
     /// [`PrefilterError`] names the value that is out of range; nothing is changed then.
+    #[inline(never)]
     pub fn tune(&mut self, tuning: &Tuning) -> Result<(), PrefilterError> {
-        let prefilter = prefilter_of(&self.config, &self.arm, tuning)?;
-        let kernel = Kernel::new(&prefilter)?;
-        self.take_up(tuning, prefilter, kernel);
-        Ok(())
-    }
-
-    /// Goes on with a prefilter that has been made of a tuning.
-    pub(crate) fn take_up(&mut self, tuning: &Tuning, prefilter: Prefilter, kernel: Kernel) {
-        self.kernel = kernel;
+        let mut prefilter = Prefilter::NONE;
+        make_prefilter(&mut prefilter, &self.config, &self.arm, tuning)?;
+        set_kernel(&mut self.kernel, &prefilter)?;
         self.limits = Limits::new(&self.config, &self.arm, &prefilter);
-        self.accelerating = prefilter.response();
-        self.decelerating = prefilter.reversed_response();
+        self.accelerating.set(prefilter.stages(), false);
+        self.decelerating.set(prefilter.stages(), true);
         self.longest_box_s = longest_box_s(&prefilter);
         self.tuning = *tuning;
+        Ok(())
     }
 
     /// The prefilter in seconds. It is made anew each time, to keep a robot small.
     #[must_use]
     pub fn prefilter(&self) -> Prefilter {
-        // one of this tuning has been made before
-        prefilter_of(&self.config, &self.arm, &self.tuning).unwrap_or(Prefilter::NONE)
+        let mut prefilter = Prefilter::NONE;
+        // one of this tuning has been made before: this does not fail
+        let _ = make_prefilter(&mut prefilter, &self.config, &self.arm, &self.tuning);
+        prefilter
     }
 
     /// The boxes that the prefilter was given because limits need them, in s.
@@ -315,18 +327,85 @@ impl Robot {
     }
 }
 
+// Each of these makes something large in a frame of its own, so that the stack holds one of
+// them at a time.
+
+#[inline(never)]
+fn set_kernel(kernel: &mut Kernel, prefilter: &Prefilter) -> Result<(), PrefilterError> {
+    *kernel = Kernel::new(prefilter)?;
+    Ok(())
+}
+
+/// Whether there are taps for the prefilter of a tuning.
+#[inline(never)]
+fn check_tuning(config: &RobotConfig, arm: &Arm, tuning: &Tuning) -> Result<(), PrefilterError> {
+    let mut prefilter = Prefilter::NONE;
+    make_prefilter(&mut prefilter, config, arm, tuning)?;
+    Kernel::new(&prefilter).map(drop)
+}
+
+/// The same without what limits add.
+#[inline(never)]
+fn check_taps(tuning: &Tuning) -> Result<(), PrefilterError> {
+    let mut prefilter = Prefilter::NONE;
+    tuning.make(&mut prefilter)?;
+    Kernel::new(&prefilter).map(drop)
+}
+
+/// The arm that the settings describe.
+///
+/// # Errors
+/// [`ConfigError`] names the first setting of the arm that is out of range.
+#[inline(never)]
+pub fn arm(config: &RobotConfig) -> Result<Arm, ConfigError> {
+    Ok(match config.arm {
+        ArmKind::Scara => Arm::Scara(Scara::new(&config.scara)?),
+        ArmKind::Delta => Arm::Delta(Delta::new(&config.delta)?),
+    })
+}
+
 fn longest_box_s(prefilter: &Prefilter) -> Option<f32> {
     prefilter.longest_box_s().map(|length_s| length_s as f32)
 }
 
-/// The prefilter of a tuning, with the boxes that the robot's limits need.
-fn prefilter_of(
+/// Makes the prefilter of a tuning, with the boxes that the robot's limits need.
+#[inline(never)]
+fn make_prefilter(
+    prefilter: &mut Prefilter,
     robot: &RobotConfig,
     arm: &Arm,
     tuning: &Tuning,
-) -> Result<Prefilter, PrefilterError> {
-    let prefilter = tuning.prefilter()?;
-    Ok(with_boxes(prefilter, &robot.limits, arm, robot.rapid_mm_s))
+) -> Result<(), PrefilterError> {
+    tuning.make(prefilter)?;
+    add_boxes(prefilter, &robot.limits, arm, robot.rapid_mm_s);
+    Ok(())
+}
+
+/// Whether all plain numbers are within their ranges.
+#[inline(never)]
+fn check_ranges(config: &RobotConfig) -> Result<(), ConfigError> {
+    let checks = [
+        ("tolerance", config.corner_tolerance_mm, 0.0, 100.0),
+        ("overlap", config.corner_overlap_percent, 0.0, 100.0),
+        ("rapid", config.rapid_mm_s, 0.001, 10_000.0),
+        ("feed-limit", config.feed_limit_mm_s, 0.001, 10_000.0),
+        ("yaw-limit", config.yaw_limit_deg_s, 0.001, 10_000.0),
+        ("joint-speed", config.joint_speed_deg_s, 0.001, 10_000.0),
+        ("uncertainty", config.shortest.uncertainty, 0.0, 0.5),
+        ("residual-limit", config.shortest.limit, 0.001, 1.0),
+    ];
+    for (name, value, low, high) in checks {
+        if !(low..=high).contains(&value) {
+            return Err(ConfigError::Range {
+                name,
+                value,
+                low,
+                high,
+            });
+        }
+    }
+    config.hop.check()?;
+    check_limits(config)
 }
 
 fn check_limits(config: &RobotConfig) -> Result<(), ConfigError> {
@@ -366,32 +445,38 @@ const fn limit_names(part: Part) -> &'static [&'static str; 3] {
     }
 }
 
-/// What chooses the prefilters of each move, if there is a map or a choice.
-fn follower(config: &RobotConfig) -> Result<Option<Follower>, ConfigError> {
-    let PrefilterConfig {
-        frequency_hz,
-        damping,
-        ..
-    } = config.prefilter;
-    let everywhere = ModeMapConfig::constant(MapNode::new(frequency_hz, damping));
-    let map = match (config.map.is_complete(), config.automatic) {
-        (true, _) => &config.map,
-        (false, true) => &everywhere,
-        (false, false) => return Ok(None),
+/// Makes what chooses the prefilters of each move, if there is a map or a choice, for these
+/// settings of the prefilter instead of the robot's own.
+#[inline(never)]
+fn make_follower(
+    place: &mut Option<Follower>,
+    config: &RobotConfig,
+    prefilter: &PrefilterConfig,
+    automatic: bool,
+) -> Result<(), ConfigError> {
+    if !config.map.is_complete() && !automatic {
+        return Ok(());
+    }
+    let (frequency_hz, damping) = (prefilter.frequency_hz, prefilter.damping);
+    let everywhere;
+    let map = if config.map.is_complete() {
+        &config.map
+    } else {
+        everywhere = ModeMapConfig::constant(MapNode::new(frequency_hz, damping));
+        &everywhere
     };
     let follow = FollowConfig {
         map,
-        prefilter: config.prefilter,
-        shortest: config.automatic.then_some(config.shortest),
+        prefilter: *prefilter,
+        shortest: automatic.then_some(config.shortest),
         method: config.posture_method,
     };
-    let follower = Follower::new(&follow).map_err(ConfigError::Follow)?;
-    Ok(Some(follower))
+    Follower::make(place, &follow).map_err(ConfigError::Follow)
 }
 
 /// What the prefilter is made of before the first move.
-fn first_tuning(config: &RobotConfig, follower: Option<&Follower>) -> Tuning {
-    follower.map_or(Tuning::Named(config.prefilter), Follower::slowest)
+fn first_tuning(config: &PrefilterConfig, follower: Option<&Follower>) -> Tuning {
+    follower.map_or(Tuning::Named(*config), Follower::slowest)
 }
 
 /// Why a `name=value` setting is refused.

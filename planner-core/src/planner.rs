@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::config::{ConfigError, Robot};
+use crate::config::{ConfigError, Robot, RobotConfig};
 use crate::gcode::{
     self, Command, Defaults, Feed, HopMove, Interpreted, Interpreter, Line, MAX_ACTIONS_A_LINE,
     Move, Offsets, ProgramFlow, RobotChange,
@@ -13,7 +13,7 @@ use crate::limits::{Course, Limited};
 use crate::path::{PathSegment, Shape};
 use crate::pose::{JointPosition, Pose};
 use crate::posture::{MoveToFollow, MoveTunings, Tuning};
-use crate::prefilter::{Kernel, PrefilterConfig};
+use crate::prefilter::{Kernel, Prefilter, PrefilterConfig};
 use crate::queue::{KERNELS_A_MOVE, SegmentProducer};
 use crate::raw::{LONGEST_S, Pace};
 use crate::schedule::{Schedule, Timing};
@@ -135,7 +135,7 @@ impl core::error::Error for LineError {}
 /// Each segment is checked as a whole before anything of its line is queued: within reach,
 /// away from singularities, within joint limits. A refused line changes nothing.
 pub struct Planner<'q> {
-    robot: Robot,
+    robot: &'q mut Robot,
     interpreter: Interpreter,
     /// The state after the lines checked, while lines are checked only.
     checking: Option<Interpreter>,
@@ -155,12 +155,13 @@ struct ElbowMove {
 }
 
 impl<'q> Planner<'q> {
-    /// A planner that has seen no line; the robot's position is not known yet.
+    /// A planner that has seen no line; the robot's position is not known yet. What it changes of
+    /// the robot it changes in the robot's place.
     #[must_use]
-    pub fn new(robot: &Robot, queue: SegmentProducer<'q>) -> Self {
+    pub fn new(robot: &'q mut Robot, queue: SegmentProducer<'q>) -> Self {
         Self {
-            robot: robot.clone(),
             interpreter: Interpreter::new(defaults(robot)),
+            robot,
             checking: None,
             schedule: Schedule::new(queue),
             joints: None,
@@ -206,11 +207,15 @@ impl<'q> Planner<'q> {
     ///
     /// # Errors
     /// [`LineError`] says what is wrong with it and what to do. The line has no effect then.
+    #[inline(never)]
     pub fn execute(&mut self, line: &Line) -> Result<Accepted, LineError> {
-        let interpreted = self.interpreter.interpret(line);
-        let interpreted = interpreted.map_err(|error| self.refused(error))?;
-        self.carry_out(&interpreted)
-            .map_err(|cause| self.refusal(cause))
+        // Not moved out of its result: one copy of it is large enough.
+        match &self.interpreter.interpret(line) {
+            Ok(interpreted) => self
+                .carry_out(interpreted)
+                .map_err(|cause| self.refusal(cause)),
+            Err(error) => Err(self.refused(*error)),
+        }
     }
 
     /// Takes the text behind `$J=`.
@@ -235,6 +240,7 @@ impl<'q> Planner<'q> {
     ///
     /// # Errors
     /// [`LineError`] says what is wrong with it and what to do.
+    #[inline(never)]
     pub fn check(&mut self, line: &Line) -> Result<(), LineError> {
         let mut interpreter = self.interpreter().clone();
         let checked = interpreter
@@ -275,7 +281,7 @@ impl<'q> Planner<'q> {
     /// The robot that planning uses.
     #[must_use]
     pub const fn robot(&self) -> &Robot {
-        &self.robot
+        self.robot
     }
 
     /// Goes on from where the motion has been stopped, the queue being empty.
@@ -357,15 +363,19 @@ impl<'q> Planner<'q> {
 
     /// Changes the robot's settings. Only while everything stands. Where the position is known
     /// the elbow stays on its side.
-    pub fn set_robot(&mut self, robot: &Robot) {
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first setting that is out of range; nothing is changed then.
+    pub fn set_config(&mut self, config: &RobotConfig) -> Result<(), ConfigError> {
         let elbow = self.robot.config.scara.elbow;
-        self.robot = robot.clone();
+        self.robot.set_config(config)?;
         if self.interpreter.modal().position().is_some() {
             self.robot.set_elbow(elbow);
         }
-        self.interpreter.set_defaults(defaults(&self.robot));
+        self.interpreter.set_defaults(defaults(self.robot));
         self.reset_modes();
         self.schedule.reset();
+        Ok(())
     }
 
     fn refusal(&mut self, cause: Cause) -> LineError {
@@ -443,6 +453,7 @@ impl<'q> Planner<'q> {
     }
 
     /// Queues a pick-and-place move, with the prefilter that is in force.
+    #[inline(never)]
     fn plan_hop(&mut self, order: &HopMove) -> Result<bool, Cause> {
         let hop = self.checked_hop(&self.robot.arm, order)?;
         Ok(self.schedule.hop(&hop, order.line))
@@ -450,31 +461,35 @@ impl<'q> Planner<'q> {
 
     /// Queues a move, with the prefilters that the map asks for.
     fn plan_move(&mut self, order: &Move, timing: &Timing) -> bool {
+        let (queued, next) = self.queue_move(order, timing);
+        if let Some(tuning) = next {
+            // its taps have been made before: this does not fail
+            let _ = self.robot.tune(&tuning);
+        }
+        queued
+    }
+
+    /// Queues a move that may change the prefilter on its way, and yields what is in force at
+    /// its end then.
+    #[inline(never)]
+    fn queue_move(&mut self, order: &Move, timing: &Timing) -> (bool, Option<Tuning>) {
         let next = self.follow(order, timing);
-        // a map whose slowest mode has a prefilter has one for every mode
-        let next = next.and_then(|tuning| {
-            let prefilter = tuning.prefilter().ok()?;
-            let kernel = Kernel::new(&prefilter).ok()?;
-            Some((tuning, prefilter, kernel))
-        });
         let queued = self.schedule.plan(
-            &self.robot,
+            self.robot,
             &order.path,
             timing,
             order.corner,
             order.line,
-            next.as_ref().map(|(_, _, kernel)| kernel),
+            next.as_ref().map(|(_, kernel)| kernel),
         );
-        if let Some((tuning, prefilter, kernel)) = next {
-            self.robot.take_up(&tuning, prefilter, kernel);
-        }
-        queued
+        (queued, next.map(|(tuning, _)| tuning))
     }
 
     /// Changes the prefilter before a move from rest as the map asks for, and yields the one
     /// to which it is to change on the move's way. The second move of a line keeps the prefilter
     /// if the first one has taken the last places for kernels.
-    fn follow(&mut self, order: &Move, timing: &Timing) -> Option<Tuning> {
+    #[inline(never)]
+    fn follow(&mut self, order: &Move, timing: &Timing) -> Option<(Tuning, Kernel)> {
         let follower = self.robot.follower.as_ref()?;
         if self.schedule.free_kernels() < KERNELS_A_MOVE {
             return None;
@@ -491,7 +506,11 @@ impl<'q> Planner<'q> {
         if !start.is_near(&self.robot.tuning) && self.robot.tune(&start).is_ok() {
             self.schedule.change_prefilter(&self.robot.kernel);
         }
-        Some(end).filter(|end| !end.is_near(&self.robot.tuning))
+        if end.is_near(&self.robot.tuning) {
+            return None;
+        }
+        // a map whose slowest mode has a prefilter has one for every mode
+        Some((end, kernel_of(&end)?))
     }
 
     /// Changes the elbow's side, by a move of the joints where the position is known.
@@ -688,6 +707,14 @@ impl<'q> Planner<'q> {
             bound: None,
         }
     }
+}
+
+/// The taps of a tuning. Not inlined, so that the prefilter is on the stack for a moment only.
+#[inline(never)]
+fn kernel_of(tuning: &Tuning) -> Option<Kernel> {
+    let mut prefilter = Prefilter::NONE;
+    tuning.make(&mut prefilter).ok()?;
+    Kernel::new(&prefilter).ok()
 }
 
 fn defaults(robot: &Robot) -> Defaults {

@@ -21,7 +21,8 @@ fn ticks(program: &[&str]) -> u32 {
     let mut queue = SegmentQueue::new();
     let (producer, consumer) = queue.split();
     let mut filters = DelayLines::new();
-    let mut planner = Planner::new(&robot, producer);
+    let mut planned = robot.clone();
+    let mut planner = Planner::new(&mut planned, producer);
     let mut motion = Motion::new(&robot, consumer, &mut filters);
     for line in program {
         let accepted = planner.line(line.as_bytes());
@@ -66,7 +67,7 @@ fn inverse_time_is_the_time_of_the_motion_within_the_limits() {
 fn with_planner(test: impl FnOnce(&mut Planner)) {
     let mut queue = SegmentQueue::new();
     let (producer, _consumer) = queue.split();
-    test(&mut Planner::new(&robot(), producer));
+    test(&mut Planner::new(&mut robot(), producer));
 }
 
 fn code(result: Result<Accepted, LineError>) -> u8 {

@@ -272,7 +272,8 @@ impl Bench {
         let (mut total, mut count) = (0, 0);
         let mut queue = SegmentQueue::new();
         let (producer, consumer) = queue.split();
-        let mut planner = Planner::new(robot, producer);
+        let mut planned = robot.clone();
+        let mut planner = Planner::new(&mut planned, producer);
         let mut motion = Motion::new(robot, consumer, filters);
         motion.obey(Order::Rates {
             feed_percent,
@@ -338,7 +339,8 @@ impl Bench {
             blocks: 0,
             stack_use: || (0, 0),
         };
-        let mut planner = Planner::new(robot, producer);
+        let mut planned = robot.clone();
+        let mut planner = Planner::new(&mut planned, producer);
         let mut controller = Controller::new(&mut planner, Settings::default(), identity);
         let mut motion = Motion::new(robot, consumer, filters);
         let mut report = Report::default();

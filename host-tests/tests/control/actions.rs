@@ -12,7 +12,8 @@ use crate::support::{CORNER_PATH, KINDS, is_at_rest, prefilter_line, robot};
 fn run(robot: &Robot, plan: impl FnOnce(&mut Controller<'_>)) -> Vec<Setpoint> {
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
-    let mut controller = Controller::new(robot, &mut queue, &mut filters);
+    let mut planned = robot.clone();
+    let mut controller = Controller::new(&mut planned, &mut queue, &mut filters);
     plan(&mut controller);
     controller.obey(Order::Start);
     let mut all = Vec::new();
@@ -97,7 +98,8 @@ fn a_pause_waits_for_resume_and_outputs_behind_it_wait_too() {
     let robot = robot(|_| {});
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
-    let mut controller = Controller::new(&robot, &mut queue, &mut filters);
+    let mut planned = robot.clone();
+    let mut controller = Controller::new(&mut planned, &mut queue, &mut filters);
     feed(&mut controller, "G0 X200 Y0\nG1 X210 F6000\nM0");
     feed(&mut controller, "M3");
     feed(&mut controller, "G1 X220");
@@ -132,7 +134,8 @@ fn a_hold_on_the_way_to_an_action_holds_it_back() {
     let robot = robot(|_| {});
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
-    let mut controller = Controller::new(&robot, &mut queue, &mut filters);
+    let mut planned = robot.clone();
+    let mut controller = Controller::new(&mut planned, &mut queue, &mut filters);
     feed(&mut controller, "G0 X200 Y0\nG1 X210 F6000");
     feed(&mut controller, "M3");
     controller.obey(Order::Start);
@@ -186,7 +189,8 @@ fn a_prefilter_that_is_refused_or_finds_no_room_changes_nothing() {
     let robot = robot(|_| {});
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
-    let mut controller = Controller::new(&robot, &mut queue, &mut filters);
+    let mut planned = robot.clone();
+    let mut controller = Controller::new(&mut planned, &mut queue, &mut filters);
     let code = |controller: &mut Controller<'_>, line: &str| {
         let planned = controller.planner().line(line.as_bytes());
         planned.map_or_else(|error| error.code(), |_| 0)

@@ -69,7 +69,8 @@ fn stop_and_go_on(robot: &Robot, stopped_at: usize) {
     let context = format!("{kind:?}, stopped at {stopped_at}");
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
-    let mut controller = Controller::new(robot, &mut queue, &mut filters);
+    let mut planned = robot.clone();
+    let mut controller = Controller::new(&mut planned, &mut queue, &mut filters);
     let stopped = stop_at(&mut controller, stopped_at);
     assert!(controller.is_empty(), "{context}");
     let last = stopped[stopped.len() - 1];
@@ -117,7 +118,8 @@ fn what_waits_is_forgotten_in_idle_and_in_a_hold() {
     for held in [false, true] {
         let mut queue = SegmentQueue::new();
         let mut filters = Box::new(DelayLines::new());
-        let mut controller = Controller::new(&robot, &mut queue, &mut filters);
+        let mut planned = robot.clone();
+        let mut controller = Controller::new(&mut planned, &mut queue, &mut filters);
         controller
             .feed(&mut CORNER_PATH.lines())
             .expect("it is right");
@@ -149,11 +151,11 @@ fn a_forgotten_change_of_the_prefilter_is_made_all_the_same() {
         damping: 0.1,
         ..PrefilterConfig::default()
     };
-    let robot_before = robot(|_| {});
-    let robot_after = robot(|config| config.prefilter = other);
+    let mut robot_before = robot(|_| {});
+    let mut robot_after = robot(|config| config.prefilter = other);
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
-    let mut controller = Controller::new(&robot_before, &mut queue, &mut filters);
+    let mut controller = Controller::new(&mut robot_before, &mut queue, &mut filters);
     controller
         .feed(&mut "G0 X200 Y0\nG1 X250 F6000".lines())
         .expect("it is right");
@@ -179,7 +181,7 @@ fn a_forgotten_change_of_the_prefilter_is_made_all_the_same() {
 
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
-    let mut fresh = Controller::new(&robot_after, &mut queue, &mut filters);
+    let mut fresh = Controller::new(&mut robot_after, &mut queue, &mut filters);
     fresh.obey(Order::Place(last.pose));
     fresh.planner().stopped_at(last.pose);
     let mut expected = Vec::new();

@@ -40,7 +40,7 @@ pub fn setpoints(robot: &Robot, program: &str, orders: &Orders) -> Vec<Setpoint>
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
     let mut all = Vec::new();
-    Controller::new(robot, &mut queue, &mut filters)
+    Controller::new(&mut robot.clone(), &mut queue, &mut filters)
         .run_with_orders(
             program,
             |tick| orders.get(&tick).copied(),

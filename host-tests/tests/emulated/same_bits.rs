@@ -371,8 +371,8 @@ fn programs_one_after_the_other_have_the_same_bits() {
     second.corner_tolerance_mm = 0.2;
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
-    let robot = Robot::new(&first).expect("valid settings");
-    let mut host = Controller::new(&robot, &mut queue, &mut filters);
+    let mut robot = Robot::new(&first).expect("valid settings");
+    let mut host = Controller::new(&mut robot, &mut queue, &mut filters);
     for (nth, (config, program)) in [
         (first, CORNER_PATH),
         (second, EVERY_WORD),
@@ -381,7 +381,7 @@ fn programs_one_after_the_other_have_the_same_bits() {
     .into_iter()
     .enumerate()
     {
-        host.set_robot(&Robot::new(&config).expect("valid settings"));
+        host.set_config(&config).expect("valid settings");
         let mut all = Vec::new();
         host.run(program, |setpoint| all.push(*setpoint))
             .expect("the program runs");

@@ -1,7 +1,7 @@
 //! A motion from rest to rest as it leaves the prefilter, exactly.
 
 use super::ramp::Ramp;
-use crate::prefilter::{Prefilter, Terms, boxes, terms};
+use crate::prefilter::{Prefilter, Terms, add_terms, boxes};
 
 /// Steps of halving: to a microsecond within a minute.
 const HALVINGS: u32 = 26;
@@ -40,13 +40,15 @@ impl Filtered {
     fn new(ramp: &Ramp, prefilter: Option<&Prefilter>) -> Self {
         let boxes_s = ramp.boxes_s();
         let stages = prefilter.map_or(&[][..], Prefilter::stages);
-        Self {
-            // a prefilter that has a response has these too
-            terms: terms(stages, false),
+        let mut filtered = Self {
+            terms: Terms::new(),
             boxes_s,
             degree: 3 + boxes(stages) as i32,
             end_s: boxes_s.iter().sum::<f64>() + prefilter.map_or(0.0, Prefilter::length_s),
-        }
+        };
+        // a prefilter that has a response has these too
+        add_terms(&mut filtered.terms, stages, false);
+        filtered
     }
 
     /// How far it has come, from 0 to 1.

@@ -128,31 +128,23 @@ impl Boxes {
     }
 }
 
-/// The prefilter with the boxes that limits need: as it is, if it has them.
+/// Gives a prefilter the boxes that limits need, if it does not have them.
 ///
 /// A box that is missing gets the length with which a rapid just keeps the limits with the
 /// forearm square to the upper arm, within 10 and 200 ms.
-#[must_use]
-pub fn with_boxes(
-    prefilter: Prefilter,
-    config: &LimitsConfig,
-    arm: &Arm,
-    rapid_mm_s: f32,
-) -> Prefilter {
+pub fn add_boxes(prefilter: &mut Prefilter, config: &LimitsConfig, arm: &Arm, rapid_mm_s: f32) {
     let needed = config.boxes_needed();
     let present = prefilter.boxes_s().len();
-    let mut prefilter = prefilter;
     if present < 1 && needed >= 1 {
         let quotient = worst_quotient(config, arm, |limits| limits.acceleration);
-        prefilter = prefilter.with_box(f64::from(rapid_mm_s * quotient).clamp(BOX_S.0, BOX_S.1));
+        prefilter.add_box(f64::from(rapid_mm_s * quotient).clamp(BOX_S.0, BOX_S.1));
     }
     if present < 2 && needed >= 2 {
         let quotient = worst_quotient(config, arm, |limits| limits.jerk);
         let first_s = prefilter.longest_box_s().unwrap_or(BOX_S.1);
         let second_s = f64::from(2.0 * rapid_mm_s * quotient) / first_s;
-        prefilter = prefilter.with_box(second_s.clamp(BOX_S.0, BOX_S.1));
+        prefilter.add_box(second_s.clamp(BOX_S.0, BOX_S.1));
     }
-    prefilter
 }
 
 /// The largest quotient of what a tool's mm moves and what is allowed of it.
@@ -174,7 +166,7 @@ fn worst_quotient(config: &LimitsConfig, arm: &Arm, limit: impl Fn(&MotionLimits
 
 impl Limits {
     /// The limits of a robot with this arm and prefilter. The prefilter has the boxes that
-    /// they need: see [`with_boxes`].
+    /// they need: see [`add_boxes`].
     #[must_use]
     pub fn new(robot: &RobotConfig, arm: &Arm, prefilter: &Prefilter) -> Self {
         let config = &robot.limits;

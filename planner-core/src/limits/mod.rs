@@ -73,5 +73,5 @@ mod run;
 
 pub use config::{Bound, Limited, LimitsConfig, MotionLimits, Order, Part};
 pub use course::Course;
-pub use feed::{Limits, with_boxes};
+pub use feed::{Limits, add_boxes};
 pub use run::{Choice, Run};

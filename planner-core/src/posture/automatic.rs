@@ -322,11 +322,13 @@ impl Shortest {
         let (uncertainty, limit) = (f64::from(config.uncertainty), f64::from(config.limit));
         Requirement::new(&most, uncertainty, limit).map_err(ShortestError::Value)?;
         let mut all: Vec<(Kind, f32, f64), { Kind::ALL.len() }> = Vec::new();
-        for (kind, prefilter) in made_for(&most, &Kind::ALL) {
-            let reach = [&least, &most].map(|mode| reach(kind, mode, limit));
-            let reach = reach.into_iter().fold(f64::INFINITY, f64::min) as f32;
+        for kind in by_length(&Kind::ALL) {
+            let Some(length_s) = length_s(kind, &most) else {
+                continue;
+            };
+            let reach = reach(kind, &least, limit).min(reach(kind, &most, limit)) as f32;
             // there is room for every kind
-            let _ = all.push((kind, reach, prefilter.length_s()));
+            let _ = all.push((kind, reach, length_s));
         }
         all.sort_unstable_by(|(_, reach, length_s), (_, other_reach, other_s)| {
             length_s
@@ -390,10 +392,12 @@ impl fmt::Display for Shortest {
 
 /// How far the mode may be off, as a fraction, for no more than `limit` to be left of it: good
 /// to 0.03 %, and never too much but by what the residual does within a percent.
+#[inline(never)]
 fn reach(kind: Kind, nominal: &Mode, limit: f64) -> f64 {
-    let Some((_, prefilter)) = made_for(nominal, &[kind]).next() else {
+    let mut prefilter = Prefilter::NONE;
+    if prefilter.set(&config(kind, nominal)).is_err() {
         return -1.0;
-    };
+    }
     let keeps = |off: f64| {
         [1.0 - off, 1.0 + off].into_iter().all(|ratio| {
             let mode = Mode {
@@ -430,10 +434,13 @@ const FURTHEST: f64 = 0.6;
 
 /// Those prefilters that can be made for a mode, the shortest first.
 fn made_for(mode: &Mode, kinds: &[Kind]) -> impl Iterator<Item = (Kind, Prefilter)> {
-    let Mode {
-        frequency_hz,
-        damping,
-    } = *mode;
+    by_length(kinds)
+        .into_iter()
+        .filter_map(|kind| Some((kind, Prefilter::new(&config(kind, mode)).ok()?)))
+}
+
+/// Those that follow from the mode alone, the shortest first.
+fn by_length(kinds: &[Kind]) -> Vec<Kind, { Kind::ALL.len() }> {
     let mut by_length: Vec<Kind, { Kind::ALL.len() }> = kinds
         .iter()
         .copied()
@@ -441,15 +448,25 @@ fn made_for(mode: &Mode, kinds: &[Kind]) -> impl Iterator<Item = (Kind, Prefilte
         .take(Kind::ALL.len())
         .collect();
     by_length.sort_unstable_by_key(|kind| (kind.quarter_periods(), *kind as u8));
-    by_length.into_iter().filter_map(move |kind| {
-        let config = PrefilterConfig {
-            kind,
-            frequency_hz: frequency_hz as f32,
-            damping: damping as f32,
-            ..PrefilterConfig::default()
-        };
-        Some((kind, Prefilter::new(&config).ok()?))
-    })
+    by_length
+}
+
+/// The settings of a kind for a mode.
+fn config(kind: Kind, mode: &Mode) -> PrefilterConfig {
+    PrefilterConfig {
+        kind,
+        frequency_hz: mode.frequency_hz as f32,
+        damping: mode.damping as f32,
+        ..PrefilterConfig::default()
+    }
+}
+
+/// The length in seconds of a kind for a mode, if it can be made.
+#[inline(never)]
+fn length_s(kind: Kind, mode: &Mode) -> Option<f64> {
+    let mut prefilter = Prefilter::NONE;
+    prefilter.set(&config(kind, mode)).ok()?;
+    Some(prefilter.length_s())
 }
 
 /// Prefilters whose lengths differ by less take equally long.

@@ -69,10 +69,21 @@ impl Tuning {
     /// # Errors
     /// [`PrefilterError`] names the value that is out of range.
     pub fn prefilter(&self) -> Result<Prefilter, PrefilterError> {
+        let mut prefilter = Prefilter::NONE;
+        self.make(&mut prefilter)?;
+        Ok(prefilter)
+    }
+
+    /// Makes the prefilter in its place.
+    ///
+    /// # Errors
+    /// As [`Tuning::prefilter`]; the prefilter is of no use then.
+    pub(crate) fn make(&self, prefilter: &mut Prefilter) -> Result<(), PrefilterError> {
         match self {
-            Self::Named(config) => Prefilter::new(config),
-            Self::Boxes(zeros_hz) => Ok(Prefilter::of_boxes(zeros_hz.map(|zero_hz| 1.0 / zero_hz))),
+            Self::Named(config) => prefilter.set(config)?,
+            Self::Boxes(zeros_hz) => prefilter.set_boxes(zeros_hz.map(|zero_hz| 1.0 / zero_hz)),
         }
+        Ok(())
     }
 
     /// Whether another one is so near that it leaves no more of the vibration than 0.5 %.
@@ -201,31 +212,48 @@ pub struct Follower {
 const SLACK_TICKS: f64 = 12.0;
 
 impl Follower {
-    /// Validates the settings. A filter for any mode of the map then fits half the delay line.
+    /// Validates the settings, and makes the follower in its place. A filter for any mode of the
+    /// map then fits half the delay line.
     ///
     /// # Errors
-    /// [`FollowError`] says what cannot be followed.
-    pub fn new(config: &FollowConfig<'_>) -> Result<Self, FollowError> {
-        let map = ModeMap::new(config.map).map_err(FollowError::Map)?;
-        let source = match (config.method, config.shortest) {
-            (PostureMethod::Local, None) => Source::Named(config.prefilter),
+    /// [`FollowError`] says what cannot be followed; the place is of no use then.
+    pub(crate) fn make(
+        place: &mut Option<Self>,
+        config: &FollowConfig<'_>,
+    ) -> Result<(), FollowError> {
+        check_map(config.map)?;
+        // with as little as can be on the stack, because it looks at many prefilters
+        let shortest = match (config.method, config.shortest) {
             (PostureMethod::Local, Some(shortest)) => {
                 let modes = config.map.used().iter().map(Mode::from);
-                let found = Shortest::new(modes, &shortest).map_err(FollowError::Shortest)?;
-                Source::Shortest(found, config.prefilter)
+                let found = Shortest::new(modes, &shortest);
+                Some(found.map_err(FollowError::Shortest)?)
             }
-            (method, _) => Source::Boxes(method),
+            _ => None,
         };
-        let follower = Self { map, source };
-        let longest = follower.slowest().prefilter();
-        let longest = longest.map_err(FollowError::Prefilter)?;
-        let kernel = Kernel::new(&longest).map_err(FollowError::Prefilter)?;
-        if usize::from(kernel.length_ticks()) > HALF_SLOTS {
-            return Err(FollowError::TooLong {
-                length_s: longest.length_s() as f32,
-            });
-        }
-        Ok(follower)
+        Self::put(place, config, shortest)?;
+        place
+            .as_ref()
+            .map_or(Ok(()), |follower| check_length(&follower.slowest()))
+    }
+
+    #[inline(never)]
+    fn put(
+        place: &mut Option<Self>,
+        config: &FollowConfig<'_>,
+        shortest: Option<Shortest>,
+    ) -> Result<(), FollowError> {
+        *place = Some(Self {
+            map: ModeMap::new(config.map).map_err(FollowError::Map)?,
+            source: match (config.method, shortest) {
+                (PostureMethod::Local, None) => Source::Named(config.prefilter),
+                (PostureMethod::Local, Some(shortest)) => {
+                    Source::Shortest(shortest, config.prefilter)
+                }
+                (method, _) => Source::Boxes(method),
+            },
+        });
+        Ok(())
     }
 
     /// A tuning for the map's slowest mode: the longest prefilter that a move can get.
@@ -311,6 +339,27 @@ impl fmt::Display for Follower {
     }
 }
 
+#[inline(never)]
+fn check_map(config: &ModeMapConfig) -> Result<(), FollowError> {
+    ModeMap::new(config).map(drop).map_err(FollowError::Map)
+}
+
+/// Whether two prefilters of a tuning fit the delay line. Not inlined, so that none is on the
+/// stack for longer.
+#[inline(never)]
+fn check_length(longest: &Tuning) -> Result<(), FollowError> {
+    let mut prefilter = Prefilter::NONE;
+    let made = longest.make(&mut prefilter);
+    made.map_err(FollowError::Prefilter)?;
+    let kernel = Kernel::new(&prefilter).map_err(FollowError::Prefilter)?;
+    if usize::from(kernel.length_ticks()) > HALF_SLOTS {
+        return Err(FollowError::TooLong {
+            length_s: prefilter.length_s() as f32,
+        });
+    }
+    Ok(())
+}
+
 /// The boxes of a move; method A's where another one has none.
 fn profile(method: PostureMethod, step: &MoveToFollow) -> (Tuning, Tuning) {
     let course = &step.course;
@@ -357,7 +406,7 @@ fn both_ends(config: &PrefilterConfig, step: &MoveToFollow) -> (Tuning, Tuning) 
     let met = |mode_after: &dyn Fn(f64) -> Mode| {
         let mut tuning = named(config, &mode_after(0.0));
         for _ in 0..2 {
-            let way_s = tuning.prefilter().map_or(0.0, |it| mean_way_s(&it));
+            let way_s = mean_way_s(&tuning);
             tuning = named(config, &mode_after(feed_mm_s * way_s));
         }
         tuning
@@ -368,8 +417,13 @@ fn both_ends(config: &PrefilterConfig, step: &MoveToFollow) -> (Tuning, Tuning) 
     )
 }
 
-/// `T/8 + σ²/(2T)`, with the variance of symmetric stages.
-fn mean_way_s(prefilter: &Prefilter) -> f64 {
+/// `T/8 + σ²/(2T)`, with the variance of symmetric stages; 0 of a prefilter that cannot be made.
+#[inline(never)]
+fn mean_way_s(tuning: &Tuning) -> f64 {
+    let mut prefilter = Prefilter::NONE;
+    if tuning.make(&mut prefilter).is_err() {
+        return 0.0;
+    }
     let length_s = prefilter.length_s();
     let variance = |stage: &Stage| {
         let stage_s = stage.length_s();
@@ -409,8 +463,17 @@ fn of_kind(config: &PrefilterConfig, kind: Kind) -> PrefilterConfig {
 /// D ≥ max(T_a, T_d) + |T_d − T_a|,   behind an arc T_a + T_d + …, because it settles first
 /// ```
 fn change_over_s(start: &Tuning, end: &Tuning, after_arc: bool) -> f64 {
-    let length_s = |tuning: &Tuning| tuning.prefilter().map_or(f64::INFINITY, |it| it.length_s());
     let (a, d) = (length_s(start), length_s(end));
     let windows = if after_arc { a + d } else { a.max(d) };
     windows + libm::fabs(d - a) + SLACK_TICKS * TICK_S
+}
+
+/// How long the prefilter of a tuning is; without end if it cannot be made.
+#[inline(never)]
+fn length_s(tuning: &Tuning) -> f64 {
+    let mut prefilter = Prefilter::NONE;
+    match tuning.make(&mut prefilter) {
+        Ok(()) => prefilter.length_s(),
+        Err(_) => f64::INFINITY,
+    }
 }

@@ -79,6 +79,17 @@ impl Prefilter {
     /// # Errors
     /// [`PrefilterError`] names the setting that is out of range.
     pub fn new(config: &PrefilterConfig) -> Result<Self, PrefilterError> {
+        let mut prefilter = Self::NONE;
+        prefilter.set(config)?;
+        Ok(prefilter)
+    }
+
+    /// Becomes the prefilter that the settings describe, in its place.
+    ///
+    /// # Errors
+    /// As [`Prefilter::new`]; it is of no use then.
+    #[inline(never)]
+    pub(crate) fn set(&mut self, config: &PrefilterConfig) -> Result<(), PrefilterError> {
         config.check()?;
         let mode = |frequency_hz: f32, damping: f32| Mode {
             frequency_hz: frequency_hz.into(),
@@ -94,15 +105,16 @@ impl Prefilter {
             (kind, mode(frequency_hz, damping))
         });
         let parts = || core::iter::once((config.kind, first)).chain(second);
-        let mut prefilter = Self { stages: Vec::new() };
+        self.stages.clear();
         for (kind, mode) in parts() {
-            prefilter.push_shaper(config, kind, &mode);
+            self.push_shaper(config, kind, &mode);
         }
         for (kind, mode) in parts() {
-            prefilter.push_boxes(config, kind, &mode)?;
+            self.push_boxes(config, kind, &mode)?;
         }
         let in_seconds = |length_ms| f64::from(length_ms) / 1e3;
-        Ok(prefilter.with_smoothing(config.smoothing_ms.map(in_seconds)))
+        self.smooth(config.smoothing_ms.map(in_seconds));
+        Ok(())
     }
 
     fn push_shaper(&mut self, config: &PrefilterConfig, kind: Kind, mode: &Mode) {
@@ -156,19 +168,17 @@ impl Prefilter {
         let _ = self.stages.insert(place, stage);
     }
 
-    /// The same with boxes that keep the feedrate from jumping, in seconds, 0 for none: the
-    /// first is that of a cascade without a box, the second that of one with fewer than two.
+    /// Adds boxes that keep the feedrate from jumping, in seconds, 0 for none: the first to a
+    /// cascade without a box, the second to one with fewer than two.
     ///
     /// A feedrate `F` then accelerates by at most `F/T1`, with a jerk of at most `F/(T1 T2)`,
     /// `T1` and `T2` being the first of [`Prefilter::boxes_s`].
-    #[must_use]
-    pub fn with_smoothing(mut self, boxes_s: [f64; 2]) -> Self {
+    fn smooth(&mut self, boxes_s: [f64; 2]) {
         for (enough, length_s) in (1..).zip(boxes_s) {
             if length_s > 0.0 && self.boxes_s().len() < enough {
                 self.push(Stage::Box(length_s));
             }
         }
-        self
     }
 
     /// Two boxes in cascade, given by their lengths in seconds: a second-order moving average,
@@ -177,10 +187,17 @@ impl Prefilter {
     /// The shorter one filters first: the longer a box, the less it errs by taking its input
     /// for straight from tick to tick.
     #[must_use]
-    pub fn of_boxes([one_s, other_s]: [f64; 2]) -> Self {
-        Self {
-            stages: Vec::from_iter([one_s.min(other_s), one_s.max(other_s)].map(Stage::Box)),
-        }
+    pub fn of_boxes(boxes_s: [f64; 2]) -> Self {
+        let mut prefilter = Self::NONE;
+        prefilter.set_boxes(boxes_s);
+        prefilter
+    }
+
+    /// Becomes [`Prefilter::of_boxes`], in its place.
+    pub(crate) fn set_boxes(&mut self, [one_s, other_s]: [f64; 2]) {
+        self.stages.clear();
+        let boxes_s = [one_s.min(other_s), one_s.max(other_s)];
+        self.stages.extend(boxes_s.map(Stage::Box));
     }
 
     /// One box, given by its length in seconds: a moving average.
@@ -191,15 +208,13 @@ impl Prefilter {
         }
     }
 
-    /// The prefilter with one more box of `length_s`, the shorter boxes before the longer ones.
-    /// As it is if it has [`MAX_STAGES`].
-    #[must_use]
-    pub fn with_box(mut self, length_s: f64) -> Self {
+    /// Adds a box of `length_s`, the shorter boxes before the longer ones, unless there are
+    /// [`MAX_STAGES`].
+    pub fn add_box(&mut self, length_s: f64) {
         let is_longer = |stage: &Stage| matches!(stage, Stage::Box(other) if *other > length_s);
         let place = self.stages.iter().position(is_longer);
         let place = place.unwrap_or(self.stages.len());
         let _ = self.stages.insert(place, Stage::Box(length_s));
-        self
     }
 
     /// The stages in the order in which they filter.

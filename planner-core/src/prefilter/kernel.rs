@@ -108,6 +108,17 @@ pub struct Kernel {
 }
 
 impl Kernel {
+    /// No filter.
+    pub const NONE: Self = Self {
+        stages: Vec::new(),
+        taps: Vec::new(),
+        length_ticks: 0,
+        delay_ticks: 0,
+        length: 0,
+        has_long_box: false,
+        centroid: 0,
+    };
+
     /// The taps of a prefilter.
     ///
     /// # Errors
@@ -121,13 +132,9 @@ impl Kernel {
             length_s: prefilter.length_s() as f32,
         };
         let mut kernel = Self {
-            stages: Vec::new(),
-            taps: Vec::new(),
-            length_ticks: 0,
-            delay_ticks: 0,
             length: tick_time(prefilter.length_s()),
             has_long_box: prefilter.longest_box_s().unwrap_or(0.0) >= LONG_BOX_S,
-            centroid: 0,
+            ..Self::NONE
         };
         for stage in prefilter.stages() {
             if stage.length_s() > SLOTS as f64 * TICK_S {

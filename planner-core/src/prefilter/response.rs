@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::{Impulses, Stage};
+use super::{Impulse, Impulses, Stage};
 
 /// Breakpoints of a response while it is made: FIR-3-hump-EI for each of two modes has 49.
 const MAX_BREAKS: usize = 50;
@@ -58,17 +58,37 @@ pub(crate) struct Term {
 pub(crate) type Terms = Vec<Term, MAX_BREAKS>;
 
 impl Response {
+    /// That of no filter, which has no pieces yet.
+    pub(crate) const NONE: Self = Self {
+        pieces: Vec::new(),
+        stride: stride(1),
+        length_s: 0.0,
+        delay_s: 0.0,
+        spread_s: 0.0,
+    };
+
     /// The response of a cascade, or of the same cascade run backwards in time.
     pub(super) fn new(stages: &[Stage], reversed: bool) -> Self {
-        let mut terms = terms(stages, reversed);
+        let mut response = Self::NONE;
+        response.set(stages, reversed);
+        response
+    }
+
+    /// Becomes the response of a cascade, or of the same cascade run backwards in time.
+    #[inline(never)]
+    pub(crate) fn set(&mut self, stages: &[Stage], reversed: bool) {
+        let mut terms = Terms::new();
+        add_terms(&mut terms, stages, reversed);
         let variance_s2: f64 = stages.iter().map(Stage::variance_s2).sum();
         terms.sort_unstable_by(|x, y| x.b.total_cmp(&y.b));
-        Self::from_terms(&terms, 1 + boxes(stages), libm::sqrt(variance_s2))
+        self.set_terms(&terms, 1 + boxes(stages));
+        self.spread_s = libm::sqrt(variance_s2) as f32;
     }
 
     /// One polynomial a piece: shift the last one to the next breakpoint, add its term.
-    fn from_terms(terms: &[Term], degree: usize, spread_s: f64) -> Self {
-        let mut pieces: Vec<f32, MAX_NUMBERS> = Vec::new();
+    fn set_terms(&mut self, terms: &[Term], degree: usize) {
+        self.pieces.clear();
+        self.stride = stride(degree);
         let mut now = [0.0_f64; COEFFICIENTS];
         let mut at = 0.0;
         let factorial: f64 = (1..=degree).map(|order| order as f64).product();
@@ -85,16 +105,11 @@ impl Response {
             let coefficients = now.iter().take(degree + 1).rev();
             // of what has no room no taps are made
             for number in core::iter::once(&at).chain(coefficients) {
-                let _ = pieces.push(*number as f32);
+                let _ = self.pieces.push(*number as f32);
             }
         }
-        Self {
-            pieces,
-            stride: stride(degree),
-            length_s: at as f32,
-            delay_s: (at - now[0]) as f32,
-            spread_s: spread_s as f32,
-        }
+        self.length_s = at as f32;
+        self.delay_s = (at - now[0]) as f32;
     }
 
     /// `T_h`, the length in seconds.
@@ -159,6 +174,7 @@ pub(crate) fn boxes(stages: &[Stage]) -> usize {
 }
 
 /// Whether a response has room for the breakpoints of a cascade.
+#[inline(never)]
 pub(super) fn has_room_for(stages: &[Stage]) -> bool {
     let stride = stride(1 + boxes(stages));
     let apart: usize = stages
@@ -172,42 +188,58 @@ pub(super) fn has_room_for(stages: &[Stage]) -> bool {
         return true;
     }
     // not all of them need be apart; where the list is full there may be too many
-    let count = terms(stages, false).len();
+    let mut terms = Terms::new();
+    add_terms(&mut terms, stages, false);
+    let count = terms.len();
     count < MAX_BREAKS && count * stride <= MAX_NUMBERS
 }
 
-/// The terms of a cascade's ramp response, or of that run backwards.
-pub(crate) fn terms(stages: &[Stage], reversed: bool) -> Terms {
-    let mut terms = Terms::new();
-    add(&mut terms, Term { b: 0.0, c: 1.0 });
+/// Adds the terms of a cascade's ramp response, or of that run backwards, to none.
+pub(crate) fn add_terms(terms: &mut Terms, stages: &[Stage], reversed: bool) {
+    add(terms, Term { b: 0.0, c: 1.0 });
     for stage in stages {
-        let impulses = match stage {
-            Stage::Box(length_s) => {
-                for Term { b, c } in core::mem::take(&mut terms) {
-                    let c = c / length_s;
-                    add(&mut terms, Term { b, c });
-                    let b = b + length_s;
-                    add(&mut terms, Term { b, c: -c });
-                }
-                continue;
-            }
-            Stage::Zv(mode) => Impulses::zv(mode),
-            Stage::Impulses(list) => *list,
-        };
-        let end = stage.length_s();
-        for Term { b, c } in core::mem::take(&mut terms) {
-            for impulse in impulses.iter() {
-                let time = if reversed {
-                    end - impulse.time_s
-                } else {
-                    impulse.time_s
-                };
-                let (b, c) = (b + time, c * impulse.amplitude);
-                add(&mut terms, Term { b, c });
+        add_stage(terms, stage, reversed);
+    }
+}
+
+/// Puts one more stage behind those that have given the terms.
+#[inline(never)]
+fn add_stage(terms: &mut Terms, stage: &Stage, reversed: bool) {
+    let before = terms.clone();
+    terms.clear();
+    match stage {
+        Stage::Box(length_s) => {
+            for &Term { b, c } in &before {
+                let c = c / length_s;
+                add(terms, Term { b, c });
+                let b = b + length_s;
+                add(terms, Term { b, c: -c });
             }
         }
+        Stage::Zv(mode) => add_impulses(terms, &before, &Impulses::zv(mode), stage, reversed),
+        Stage::Impulses(list) => add_impulses(terms, &before, list, stage, reversed),
     }
-    terms
+}
+
+fn add_impulses(
+    terms: &mut Terms,
+    before: &[Term],
+    impulses: &[Impulse],
+    stage: &Stage,
+    reversed: bool,
+) {
+    let end = stage.length_s();
+    for &Term { b, c } in before {
+        for impulse in impulses {
+            let time = if reversed {
+                end - impulse.time_s
+            } else {
+                impulse.time_s
+            };
+            let (b, c) = (b + time, c * impulse.amplitude);
+            add(terms, Term { b, c });
+        }
+    }
 }
 
 /// Adds a term, joined with one at the same time if there is one.

@@ -746,9 +746,8 @@ impl Controller<'_, '_> {
         if self.robot().config.prefilter == self.settings.robot.prefilter {
             return;
         }
-        // A robot has been made of these settings before.
-        if let Ok(robot) = Robot::new(&self.settings.robot) {
-            self.planner.set_robot(&robot);
+        // They have been in force before: this does not fail.
+        if self.planner.set_config(&self.settings.robot).is_ok() {
             self.out(Out::Robot);
         }
     }
@@ -1140,24 +1139,26 @@ impl Controller<'_, '_> {
         }
     }
 
-    /// Puts settings in force, or refuses them. Not inlined, so that the new robot is on the
-    /// stack for a moment only.
-    #[inline(never)]
+    /// Puts settings in force, or refuses them.
     fn adopt(&mut self, settings: &Settings) -> bool {
+        let put = self.put_in_force(settings);
+        if let Err(error) = put {
+            self.out(Out::RobotRefused(error));
+            self.out(Out::Error(Refusal::NoRobot.code()));
+        }
+        put.is_ok()
+    }
+
+    /// Puts settings in force; if they are refused nothing changes.
+    #[inline(never)]
+    fn put_in_force(&mut self, settings: &Settings) -> Result<(), ConfigError> {
         if settings.robot != self.settings.robot {
-            match Robot::new(&settings.robot) {
-                Ok(robot) => self.planner.set_robot(&robot),
-                Err(error) => {
-                    self.out(Out::RobotRefused(error));
-                    self.out(Out::Error(Refusal::NoRobot.code()));
-                    return false;
-                }
-            }
+            self.planner.set_config(&settings.robot)?;
             self.out(Out::Robot);
         }
         self.settings = *settings;
         self.cadence.offset_changed();
-        true
+        Ok(())
     }
 
     fn set_startup_line(&mut self, line: u8, text: &str) {
@@ -1307,13 +1308,9 @@ impl Controller<'_, '_> {
         if jog.push_str("G91 ").is_err() || jog.push_str(text).is_err() {
             return self.refuse(Refusal::LineTooLong);
         }
-        let mut config = self.settings.robot;
-        config.prefilter = EXCITING;
-        // It has been made of these settings before, but for a prefilter that always can be.
-        let Ok(robot) = Robot::new(&config) else {
+        if self.excite().is_err() {
             return self.refuse(Refusal::NoRobot);
-        };
-        self.planner.set_robot(&robot);
+        }
         self.out(Out::Robot);
         let start = self.target();
         match self.planner.jog(jog.as_bytes()) {
@@ -1334,6 +1331,15 @@ impl Controller<'_, '_> {
                 self.out(Out::Error(error.code()));
             }
         }
+    }
+
+    /// The prefilter that leaves most of the vibration. It always can be made, and the other
+    /// settings have been in force before.
+    #[inline(never)]
+    fn excite(&mut self) -> Result<(), ConfigError> {
+        let mut config = self.settings.robot;
+        config.prefilter = EXCITING;
+        self.planner.set_config(&config)
     }
 
     /// Goes on with an identification; whether there was something to do.
@@ -1464,9 +1470,7 @@ impl Controller<'_, '_> {
     }
 
     fn adopt_kept(&mut self, settings: &Settings) {
-        if Robot::new(&settings.robot).is_ok() {
-            self.adopt(settings);
-        } else {
+        if self.put_in_force(settings).is_err() {
             self.store_was_damaged();
         }
     }
