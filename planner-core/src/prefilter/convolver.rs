@@ -154,10 +154,13 @@ impl<const AXES: usize> Filter<AXES> {
         input: [i32; AXES],
     ) -> [i64; AXES] {
         self.head = self.head.wrapping_sub(1);
-        let mut sample = input;
-        let mut total = input.map(|value| i64::from(value) << WEIGHT_BITS);
         let mut taps = kernel.taps.as_slice();
-        for (stage, sums) in kernel.stages.iter().zip(&mut self.sums) {
+        let mut stages = kernel.stages.iter().zip(&mut self.sums);
+        let Some((mut stage, mut sums)) = stages.next() else {
+            return input.map(|value| i64::from(value) << FINE_BITS);
+        };
+        let mut sample = input;
+        let total = loop {
             let newest = self.head.wrapping_add(usize::from(stage.first_slot));
             line[slot::<FIRST, USED>(newest)] = sample;
             let delayed = Delayed::<AXES, FIRST, USED> {
@@ -166,7 +169,7 @@ impl<const AXES: usize> Filter<AXES> {
                 age: self.age,
                 rest: &self.rest,
             };
-            total = match stage.shape {
+            let total = match stage.shape {
                 Shape::Two => delayed.weighted::<3>(&mut taps, [0; AXES]),
                 Shape::Three => delayed.weighted::<5>(&mut taps, [0; AXES]),
                 Shape::Four => delayed.weighted::<7>(&mut taps, [0; AXES]),
@@ -179,8 +182,12 @@ impl<const AXES: usize> Filter<AXES> {
                     *sums
                 }
             };
+            let Some(next) = stages.next() else {
+                break total;
+            };
+            (stage, sums) = next;
             sample = total.map(|value| round_off(value, WEIGHT_BITS) as i32);
-        }
+        };
         self.age = self.age.saturating_add(1);
         total.map(|value| round_off(value, WEIGHT_BITS - FINE_BITS))
     }
