@@ -60,13 +60,15 @@ struct Fade {
 }
 
 impl Fade {
-    /// An output with what is left of it in this tick.
+    /// Adds what is left of it in this tick to an output.
     #[inline(never)]
-    fn step(&mut self, output: [i64; AXES]) -> [i64; AXES] {
+    fn step(&mut self, output: &mut [i64; AXES]) {
         self.ticks = self.ticks.saturating_sub(1);
         let part = i64::from(self.ticks);
-        let left = |value: i64| value.wrapping_mul(part) / i64::from(FADE_TICKS);
-        core::array::from_fn(|axis| output[axis].wrapping_add(left(self.offset[axis])))
+        for (value, offset) in output.iter_mut().zip(self.offset) {
+            let left = offset.wrapping_mul(part) / i64::from(FADE_TICKS);
+            *value = value.wrapping_add(left);
+        }
     }
 }
 
@@ -148,11 +150,11 @@ impl Changeover {
 
     /// The output for the raw point of this tick, in 2^-32 mm.
     pub fn step(&mut self, filters: &mut ConvolverPair<AXES>, chord: [i32; AXES]) -> [i64; AXES] {
-        let output = filters.process(self.second, self.kernel(), chord);
-        if self.fade.ticks == 0 {
-            return output;
+        let mut output = filters.process(self.second, self.kernel(), chord);
+        if self.fade.ticks != 0 {
+            self.fade.step(&mut output);
         }
-        self.fade.step(output)
+        output
     }
 
     /// Feeds the filter to come, if its raw path moves evenly, and yields by how much that path

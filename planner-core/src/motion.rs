@@ -1,5 +1,7 @@
 //! The tick: from the raw path to joint setpoints, once a millisecond.
 
+use core::array;
+
 use crate::arcs::{ARC_CHANNELS, ArcFilters, Arcs};
 use crate::changeover::Changeover;
 use crate::config::Robot;
@@ -316,26 +318,12 @@ impl<'q> Motion<'q> {
                 self.history[1]
             }
         };
-        let [before, now] = self.history;
-        self.history = [now, newest];
-        let point = now.map(|value| round_off(value) as i32);
-        let coming = difference(&newest, &now);
-        let going = difference(&now, &before);
-        let twice = sum(&coming, &going);
-        let bend = difference(&coming, &going);
         let (pose, joints) = match self.space {
-            Space::Tool => {
-                let pose = Pose::from_bits(point);
-                let (velocity, acceleration) = (twice.map(velocity_of), bend.map(acceleration_of));
-                let joints = self.kinematics.joint_state(&pose, velocity, acceleration);
-                (pose, joints)
-            }
-            Space::Joints => {
-                let position = JointPosition::from_bits(point);
-                let joints = joint_space::state(self.kinematics.kind(), position, twice, bend);
-                (self.kinematics.forward(&position), joints)
-            }
+            Space::Tool => self.move_tool(&newest),
+            Space::Joints => self.move_joints(&newest),
         };
+        let [before, now] = &mut self.history;
+        (*before, *now) = (*now, newest);
         Setpoint {
             pose,
             joints,
@@ -344,6 +332,27 @@ impl<'q> Motion<'q> {
             outputs: self.outputs,
             placed: core::mem::take(&mut self.placed),
         }
+    }
+
+    /// The pose of the tick before and what the joints do, when the tool moves on to `newest`.
+    fn move_tool(&self, newest: &[i64; AXES]) -> (Pose, JointState) {
+        let [before, now] = &self.history;
+        let pose = Pose::from_bits(now.map(|value| round_off(value) as i32));
+        let velocity = array::from_fn(|axis| velocity_of(twice(newest, before, axis)));
+        let acceleration = array::from_fn(|axis| acceleration_of(bend(newest, now, before, axis)));
+        let joints = self.kinematics.joint_state(&pose, velocity, acceleration);
+        (pose, joints)
+    }
+
+    /// The same, when the joints move on to `newest`.
+    #[inline(never)]
+    fn move_joints(&self, newest: &[i64; AXES]) -> (Pose, JointState) {
+        let [before, now] = &self.history;
+        let position = JointPosition::from_bits(now.map(|value| round_off(value) as i32));
+        let twice = array::from_fn(|axis| twice(newest, before, axis));
+        let bend = array::from_fn(|axis| bend(newest, now, before, axis));
+        let joints = joint_space::state(self.kinematics.kind(), position, twice, bend);
+        (self.kinematics.forward(&position), joints)
     }
 
     /// How far the motion has come.
@@ -409,7 +418,7 @@ impl<'q> Motion<'q> {
         let (chord, moved, changes_over) = (raw.chord, raw.moved, raw.changes_over);
         let direct = raw.direct;
         let [bow_x, bow_y] = self.arcs.step(&mut self.filters.arcs, kernel, &raw);
-        let line = self.changeover.step(&mut self.filters.lines, chord);
+        let mut line = self.changeover.step(&mut self.filters.lines, chord);
         if changes_over {
             self.changeover.expect();
         } else if self.changeover.is_due() {
@@ -423,19 +432,23 @@ impl<'q> Motion<'q> {
         // the filters and then the two ticks of history have settled
         let settled = self.stood_for > self.changeover.kernel().delay_ticks() + 1;
         if settled && self.changeover.has_faded() {
-            self.take_expected_kernel();
-            self.changeover.come_to_rest(&mut self.filters.lines, chord);
-            self.come_to_rest();
-            return self.history[1];
+            return self.settle(chord);
         }
-        let mut newest = line;
-        for ((value, chord), is_direct) in newest.iter_mut().zip(chord).zip(direct) {
-            if is_direct {
-                *value = i64::from(chord) << FINE_BITS;
-            }
+        if direct != [false; AXES] {
+            pass_directly(&mut line, chord, direct);
         }
-        let [x, y, z, c] = newest;
-        [x.wrapping_add(bow_x), y.wrapping_add(bow_y), z, c]
+        let [x, y, ..] = &mut line;
+        (*x, *y) = (x.wrapping_add(bow_x), y.wrapping_add(bow_y));
+        line
+    }
+
+    /// Everything stands at a point of the raw path: what has waited for that happens.
+    #[inline(never)]
+    fn settle(&mut self, chord: [i32; AXES]) -> [i64; AXES] {
+        self.take_expected_kernel();
+        self.changeover.come_to_rest(&mut self.filters.lines, chord);
+        self.come_to_rest();
+        self.history[1]
     }
 
     /// Takes the kernel that is to come into force on the way of the segment that has begun.
@@ -568,12 +581,28 @@ impl<'q> Motion<'q> {
     }
 }
 
-fn sum(a: &[i64; AXES], b: &[i64; AXES]) -> [i64; AXES] {
-    core::array::from_fn(|axis| a[axis].wrapping_add(b[axis]))
+/// Puts the raw point in the place of the filter's output on the axes that are not filtered.
+#[inline(never)]
+fn pass_directly(newest: &mut [i64; AXES], chord: [i32; AXES], direct: [bool; AXES]) {
+    for ((value, chord), is_direct) in newest.iter_mut().zip(chord).zip(direct) {
+        if is_direct {
+            *value = i64::from(chord) << FINE_BITS;
+        }
+    }
 }
 
-fn difference(a: &[i64; AXES], b: &[i64; AXES]) -> [i64; AXES] {
-    core::array::from_fn(|axis| a[axis].wrapping_sub(b[axis]))
+/// The change over two ticks.
+fn twice(newest: &[i64; AXES], before: &[i64; AXES], axis: usize) -> i64 {
+    newest[axis].wrapping_sub(before[axis])
+}
+
+/// The second difference.
+fn bend(newest: &[i64; AXES], now: &[i64; AXES], before: &[i64; AXES], axis: usize) -> i64 {
+    let (coming, going) = (
+        newest[axis].wrapping_sub(now[axis]),
+        now[axis].wrapping_sub(before[axis]),
+    );
+    coming.wrapping_sub(going)
 }
 
 /// Rounds a command in 2^-32 mm to the pose's 2^-19 mm.

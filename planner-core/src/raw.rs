@@ -150,14 +150,18 @@ impl RawSegment {
 
     /// The point of the chord after `progress` in 2^-30 of the segment.
     ///
-    /// It is exactly the start at 0 and the target at [`UNIT`].
+    /// It is exactly the start at 0 and the target at [`UNIT`]:
+    ///
+    /// ```text
+    /// start + (target − start) u = start (1 − u) + target u,   two products of 32 bits
+    /// ```
     #[must_use]
     pub fn chord_point(&self, progress: i32) -> [i32; AXES] {
+        let left = UNIT - progress;
         let mut point = self.start;
         for (value, target) in point.iter_mut().zip(self.target) {
-            let length = i64::from(target) - i64::from(*value);
-            let done = (length * i64::from(progress) + i64::from(UNIT / 2)) >> 30;
-            *value = value.wrapping_add(done as i32);
+            let from_start = i64::from(*value) * i64::from(left) + i64::from(UNIT / 2);
+            *value = ((from_start + i64::from(target) * i64::from(progress)) >> 30) as i32;
         }
         point
     }

@@ -374,8 +374,10 @@ impl<'q> Walker<'q> {
                     self.walk = Walk::Moving(way);
                     moved |= next.is_some_and(RawSegment::moves);
                     self.line = next.map_or(self.line, |next| next.line);
-                    self.direct = match (next, self.queue.hop()) {
-                        (Some(next), Some(hop)) if next.is_hop => hop.direct,
+                    self.direct = match next {
+                        Some(next) if next.is_hop => {
+                            self.queue.hop().map_or([false; AXES], |hop| hop.direct)
+                        }
                         _ => [false; AXES],
                     };
                     began = true;
@@ -394,11 +396,12 @@ impl<'q> Walker<'q> {
         };
         if let (Walk::Moving(way), Some(segment)) = (&self.walk, segment) {
             step.progress = to_unit(way.progress);
-            step.chord = match self.queue.hop() {
-                Some(hop) if segment.is_hop => {
-                    hop.point(segment, segment.duration.wrapping_sub(way.remaining))
-                }
-                _ => segment.chord_point(step.progress),
+            step.chord = if segment.is_hop
+                && let Some(hop) = self.queue.hop()
+            {
+                hop.point(segment, segment.duration.wrapping_sub(way.remaining))
+            } else {
+                segment.chord_point(step.progress)
             };
             if began {
                 step.began = segment.bow.as_ref();

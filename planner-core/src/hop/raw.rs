@@ -41,6 +41,7 @@ impl RawHop {
     ///
     /// Constant cost: three progresses and six products of 64 bits.
     #[must_use]
+    #[inline(never)]
     pub fn point(&self, segment: &RawSegment, elapsed: TickTime) -> [i32; AXES] {
         let since = |ticks: u32| elapsed - (TickTime::from(ticks) << 32);
         let across = self.across.progress(since(self.across_begins)) as i64;

@@ -123,7 +123,7 @@ impl<const AXES: usize> ConvolverPair<AXES> {
 struct Filter<const AXES: usize> {
     /// Slot of the newest sample of the first stage.
     head: usize,
-    /// Running sums of the boxes, by stage, in 2^-30 of the input's unit.
+    /// Running sums of the boxes, by stage, in 2^-30 of the input's unit; since the reset.
     sums: [[i64; AXES]; MAX_STAGES],
     /// Samples from before the reset read as this.
     rest: [i32; AXES],
@@ -144,7 +144,6 @@ impl<const AXES: usize> Filter<AXES> {
     fn reset(&mut self, rest: [i32; AXES]) {
         self.rest = rest;
         self.age = 0;
-        self.sums = [rest.map(|value| i64::from(value) << WEIGHT_BITS); MAX_STAGES];
     }
 
     #[inline(never)]
@@ -155,29 +154,40 @@ impl<const AXES: usize> Filter<AXES> {
         input: [i32; AXES],
     ) -> [i64; AXES] {
         self.head = self.head.wrapping_sub(1);
-        let mut total = input.map(|value| i64::from(value) << WEIGHT_BITS);
         let mut taps = kernel.taps.as_slice();
-        for (stage, sums) in kernel.stages.iter().zip(&mut self.sums) {
+        let mut stages = kernel.stages.iter().zip(&mut self.sums);
+        let Some((mut stage, mut sums)) = stages.next() else {
+            return input.map(|value| i64::from(value) << FINE_BITS);
+        };
+        let mut sample = input;
+        let total = loop {
             let newest = self.head.wrapping_add(usize::from(stage.first_slot));
-            line[slot::<FIRST, USED>(newest)] =
-                total.map(|value| round_off(value, WEIGHT_BITS) as i32);
+            line[slot::<FIRST, USED>(newest)] = sample;
             let delayed = Delayed::<AXES, FIRST, USED> {
                 line,
                 head: self.head,
                 age: self.age,
                 rest: &self.rest,
             };
-            total = match stage.shape {
+            let total = match stage.shape {
                 Shape::Two => delayed.weighted::<3>(&mut taps, [0; AXES]),
                 Shape::Three => delayed.weighted::<5>(&mut taps, [0; AXES]),
                 Shape::Four => delayed.weighted::<7>(&mut taps, [0; AXES]),
                 Shape::Five => delayed.weighted::<9>(&mut taps, [0; AXES]),
                 Shape::Box => {
+                    if self.age == 0 {
+                        *sums = self.rest.map(|value| i64::from(value) << WEIGHT_BITS);
+                    }
                     *sums = delayed.weighted::<5>(&mut taps, *sums);
                     *sums
                 }
             };
-        }
+            let Some(next) = stages.next() else {
+                break total;
+            };
+            (stage, sums) = next;
+            sample = total.map(|value| round_off(value, WEIGHT_BITS) as i32);
+        };
         self.age = self.age.saturating_add(1);
         total.map(|value| round_off(value, WEIGHT_BITS - FINE_BITS))
     }
