@@ -829,6 +829,7 @@ fn named<T: Copy>(names: &[(&str, T)], text: &str) -> Option<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::posture::MapNode;
     use std::format;
 
     #[test]
@@ -900,5 +901,28 @@ mod tests {
             let message = format!("{}", Robot::new(&config).expect_err(text));
             assert!(message.contains(name), "{text}: {message}");
         }
+    }
+
+    #[test]
+    fn limits_are_refused_where_they_are_not_kept() {
+        let refused = |change: fn(&mut RobotConfig)| {
+            let mut config = RobotConfig::default();
+            config.set("path-acceleration=1000").unwrap();
+            change(&mut config);
+            Robot::new(&config).err()
+        };
+        assert_eq!(refused(|_| {}), None);
+        let on_delta = refused(|config| config.arm = ArmKind::Delta);
+        assert_eq!(on_delta, Some(ConfigError::LimitsOnDelta));
+        let on_map =
+            refused(|config| config.map = ModeMapConfig::constant(MapNode::new(9.0, 0.02)));
+        assert_eq!(on_map, Some(ConfigError::LimitsOnMap));
+        let automatic = refused(|config| config.automatic = true);
+        assert_eq!(automatic, Some(ConfigError::LimitsOnMap));
+        // a limit of velocity needs no box, which the map could change
+        let mut config = RobotConfig::default();
+        config.set("path-velocity=100").unwrap();
+        config.map = ModeMapConfig::constant(MapNode::new(9.0, 0.02));
+        assert!(Robot::new(&config).is_ok());
     }
 }

@@ -109,7 +109,7 @@ impl Default for FullConfig {
 
 impl FullConfig {
     /// A delta robot. With its motors held and its arms 20° down it resonates first at 36.6 Hz,
-    /// as [vNoorden21] has measured. The thesis gives the drives at the motor and no gear: here
+    /// as \[vNoorden21\] has measured. The thesis gives the drives at the motor and no gear: here
     /// the motor's inertia behind it equals the load's, and the torque limit is some three times
     /// what the thesis's fastest moves need.
     #[must_use]

@@ -31,7 +31,7 @@ pub struct DeltaArm {
 }
 
 impl Default for DeltaArm {
-    /// The robot of [vNoorden21].
+    /// The robot of \[vNoorden21\].
     fn default() -> Self {
         Self {
             offset_mm: 155.0,

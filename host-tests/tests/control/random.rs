@@ -18,9 +18,9 @@ fn random_programs_keep_their_promises_under_random_control() {
 }
 
 #[test]
-#[ignore = "long: two thousand programs"]
+#[ignore = "long: hundreds of programs"]
 fn many_random_programs_keep_their_promises_under_random_control() {
-    keep_their_promises(105..2100);
+    keep_their_promises(105..805);
 }
 
 /// The checker matches trace and path in order. Which corner a passage belongs to cannot be
@@ -72,9 +72,9 @@ fn corners_a_filter_apart_keep_the_tolerance_when_hurried() {
 }
 
 #[test]
-#[ignore = "long: forty thousand programs"]
+#[ignore = "long: ten thousand programs"]
 fn many_corners_a_filter_apart_keep_the_tolerance_when_hurried() {
-    corners_a_filter_apart(3000..43_000);
+    corners_a_filter_apart(3000..13_000);
 }
 
 /// Corners closer together than three times the tolerance share it: there the distance from the

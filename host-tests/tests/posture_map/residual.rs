@@ -181,7 +181,7 @@ fn the_map_leaves_five_times_less_than_the_best_single_frequency() {
     }
 }
 
-/// A minute.
+/// Half a minute.
 #[test]
 #[ignore = "long: 100 moves"]
 fn over_a_hundred_moves_the_map_leaves_five_times_less() {
@@ -194,7 +194,7 @@ fn over_a_hundred_moves_the_map_leaves_five_times_less() {
     }
 }
 
-/// A minute. The published prefilters, and two boxes, gain the most.
+/// Half a minute. The published prefilters, and two boxes, gain the most.
 #[test]
 #[ignore = "long: every prefilter"]
 fn the_map_leaves_less_with_every_prefilter() {

@@ -9,7 +9,7 @@
 //! | `noise` | says what is left |
 //! | `mode` | says what is to be believed, and how much |
 //!
-//! The scan is that of [vNoorden21] as the project knows it. Where that goes on with logarithms
+//! The scan is that of \[vNoorden21\] as the project knows it. Where that goes on with logarithms
 //! of a heterodyned signal, this fits the decays themselves: it is cheaper, it needs no band
 //! between two modes, and with white noise it comes close to the Cramér-Rao bound, which no
 //! estimate without prior knowledge beats.

@@ -35,7 +35,7 @@ pub struct DeltaConfig {
 }
 
 impl Default for DeltaConfig {
-    /// The robot of [vNoorden21]. Over its workspace, 797 × 797 × 228 mm with Z from −828 to
+    /// The robot of \[vNoorden21\]. Over its workspace, 797 × 797 × 228 mm with Z from −828 to
     /// −600, its arms are between −35.1° and 104.1°, its forearms 28.2° from serial singularity
     /// or further, and they span 0.22 or more.
     fn default() -> Self {

@@ -18,7 +18,7 @@ pub struct MotionLimits {
 pub struct LimitsConfig {
     /// Of each joint: in °, joint 3 in mm.
     pub joints: [MotionLimits; 4],
-    /// Of the tool along its path, in mm: tangential, after [Li23] Table 4.
+    /// Of the tool along its path, in mm: tangential, after \[Li23\] Table 4.
     pub path: MotionLimits,
     /// Of the tool along each of X, Y and Z, in mm: axial, likewise.
     pub axis: MotionLimits,

@@ -26,7 +26,7 @@ pub struct PrefilterConfig {
     /// to 10 000.
     pub s_curve_feed_mm_s: f32,
     /// The jerk `J` with which `s-curve` reaches the feedrate `F`, in mm/s³ up to 1e9: its
-    /// boxes are then `T_rr = √(F/J)` [Li23]; 0 for boxes of [`Self::box_ms`].
+    /// boxes are then `T_rr = √(F/J)` \[Li23\]; 0 for boxes of [`Self::box_ms`].
     pub s_curve_jerk_mm_s3: f32,
     /// The list of impulses of `custom`.
     pub impulses: [CustomImpulse; MAX_IMPULSES],
@@ -64,7 +64,7 @@ impl Default for PrefilterConfig {
 }
 
 impl PrefilterConfig {
-    /// FIR-ZVD for the mode of [Yeh26], and nothing else.
+    /// FIR-ZVD for the mode of \[Yeh26\], and nothing else.
     pub const DEFAULT: Self = {
         let none = CustomImpulse {
             time_ms: 0.0,

@@ -194,7 +194,7 @@ impl Kernel {
 
     /// How long the raw path stands at an exact stop, when it arrives `until_tick` before a tick.
     ///
-    /// `T_h`; without a box of [`LONG_BOX_S`] long enough that the last impulse, which is split
+    /// `T_h`; without a box of `LONG_BOX_S` long enough that the last impulse, which is split
     /// over two ticks, is over at the first tick on the next segment: until then the output is
     /// not quite at the corner.
     #[must_use]

@@ -28,9 +28,9 @@ pub enum Kind {
     TwoHumpEi,
     /// Five impulses whose residual touches the one allowed at the nominal frequency and beside.
     ThreeHumpEi,
-    /// Two equal boxes: the S-curve of [Li23].
+    /// Two equal boxes: the S-curve of \[Li23\].
     SCurve,
-    /// One box of any length: the acceleration of ADAI [Li23].
+    /// One box of any length: the acceleration of ADAI \[Li23\].
     Box,
     /// A list of impulses from the settings.
     Custom,
