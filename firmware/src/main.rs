@@ -150,9 +150,13 @@ async fn sample_task(link: &'static Link, port: SampleIn) {
     samples::run(link, port).await
 }
 
+/// The future itself, not one that awaits it: that would hold its arguments twice, and its
+/// first poll would move it by way of the stack.
 #[embassy_executor::task]
-async fn command_task(commands: Commands<CommandIn, CommandOut, BoardFlash>) {
-    command::run(commands).await
+fn command_task(
+    commands: Commands<CommandIn, CommandOut, BoardFlash>,
+) -> impl Future<Output = ()> {
+    command::run(commands)
 }
 
 #[embassy_executor::task]

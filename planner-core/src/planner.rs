@@ -619,8 +619,7 @@ impl<'q> Planner<'q> {
         if self.robot.limits.is_set() {
             return Err(Cause::Hop(HopError::Limited));
         }
-        let config = &self.robot.config;
-        let own = config.hop;
+        let own = self.robot.config.hop;
         let wanted = HopConfig {
             height_mm: order.height_mm.unwrap_or(own.height_mm),
             rise_mm: order.rise_mm.unwrap_or(own.rise_mm),
@@ -628,13 +627,7 @@ impl<'q> Planner<'q> {
             acceleration_mm_s2: order.acceleration_mm_s2.unwrap_or(own.acceleration_mm_s2),
             axes: own.axes,
         };
-        let limits = HopLimits {
-            feed_mm_s: config.feed_limit_mm_s,
-            yaw_deg_s: config.yaw_limit_deg_s,
-        };
-        let prefilter = self.robot.prefilter();
-        let hop = hop::plan(order.start, order.target, &wanted, &limits, &prefilter);
-        let hop = hop.map_err(Cause::Hop)?;
+        let hop = self.hop_of(order, &wanted).map_err(Cause::Hop)?;
         for [start, target] in hop.outline(wanted.height_mm) {
             let line = PathSegment {
                 start,
@@ -644,6 +637,19 @@ impl<'q> Planner<'q> {
             arm.check_segment(&line).map_err(Cause::Segment)?;
         }
         Ok(hop)
+    }
+
+    /// A pick-and-place move with the prefilter that is in force. Not inlined, so that the
+    /// prefilter is on the stack for a moment only.
+    #[inline(never)]
+    fn hop_of(&self, order: &HopMove, wanted: &HopConfig) -> Result<Hop, HopError> {
+        let config = &self.robot.config;
+        let limits = HopLimits {
+            feed_mm_s: config.feed_limit_mm_s,
+            yaw_deg_s: config.yaw_limit_deg_s,
+        };
+        let prefilter = self.robot.prefilter();
+        hop::plan(order.start, order.target, wanted, &limits, &prefilter)
     }
 
     /// How long a motion takes; zero if it is shorter than anything.

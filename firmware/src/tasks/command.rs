@@ -35,7 +35,7 @@ pub struct Commands<I, O, F: NorFlash> {
 }
 
 /// Serves the command port for ever.
-pub async fn run<F: NorFlash<Error: Debug>>(commands: Commands<impl ByteIn, impl ByteOut, F>) -> ! {
+pub async fn run<F: NorFlash<Error: Debug>>(commands: Commands<impl ByteIn, impl ByteOut, F>) {
     let Commands {
         mut input,
         mut output,

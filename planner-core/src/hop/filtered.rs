@@ -1,7 +1,7 @@
 //! A motion from rest to rest as it leaves the prefilter, exactly.
 
 use super::ramp::Ramp;
-use crate::prefilter::{Prefilter, Terms, add_terms, boxes};
+use crate::prefilter::{Prefilter, Stage, Term, Terms, add_terms, boxes};
 
 /// Steps of halving: to a microsecond within a minute.
 const HALVINGS: u32 = 26;
@@ -15,7 +15,10 @@ pub(super) fn times_s<const N: usize>(
     prefilter: Option<&Prefilter>,
     progress: [f64; N],
 ) -> [f64; N] {
-    let filtered = Filtered::new(ramp, prefilter);
+    let mut terms = Terms::new();
+    // a prefilter that has a response has these too
+    add_terms(&mut terms, stages(prefilter), false);
+    let filtered = Filtered::new(ramp, prefilter, &terms);
     progress.map(|progress| filtered.time_of(progress))
 }
 
@@ -26,29 +29,25 @@ pub(super) fn times_s<const N: usize>(
 /// ```
 /// with the prefilter's impulses and the edges of its boxes as `b_k`, and the eight edges of the
 /// ramp's boxes in the inner sum.
-struct Filtered {
+struct Filtered<'t> {
     /// Those of the prefilter's ramp response.
-    terms: Terms,
+    terms: &'t [Term],
     boxes_s: [f64; 3],
     degree: i32,
     /// When it has ended.
     end_s: f64,
 }
 
-impl Filtered {
-    /// What the prefilter makes of a ramp.
-    fn new(ramp: &Ramp, prefilter: Option<&Prefilter>) -> Self {
+impl<'t> Filtered<'t> {
+    /// What the prefilter, whose terms these are, makes of a ramp.
+    fn new(ramp: &Ramp, prefilter: Option<&Prefilter>, terms: &'t [Term]) -> Self {
         let boxes_s = ramp.boxes_s();
-        let stages = prefilter.map_or(&[][..], Prefilter::stages);
-        let mut filtered = Self {
-            terms: Terms::new(),
+        Self {
+            terms,
             boxes_s,
-            degree: 3 + boxes(stages) as i32,
+            degree: 3 + boxes(stages(prefilter)) as i32,
             end_s: boxes_s.iter().sum::<f64>() + prefilter.map_or(0.0, Prefilter::length_s),
-        };
-        // a prefilter that has a response has these too
-        add_terms(&mut filtered.terms, stages, false);
-        filtered
+        }
     }
 
     /// How far it has come, from 0 to 1.
@@ -66,7 +65,7 @@ impl Filtered {
                     sign = -sign;
                 }
             }
-            for term in &self.terms {
+            for term in self.terms {
                 let since = time_s - term.b - edge_s;
                 if since > 0.0 {
                     sum += sign * term.c * power(since, self.degree);
@@ -97,6 +96,10 @@ impl Filtered {
         }
         after
     }
+}
+
+fn stages(prefilter: Option<&Prefilter>) -> &[Stage] {
+    prefilter.map_or(&[], Prefilter::stages)
 }
 
 /// `x` to a small power.

@@ -23,5 +23,5 @@ pub use kind::Kind;
 pub use mode::Mode;
 pub use residual::{Band, insensitivity, residual};
 pub use response::Response;
-pub(crate) use response::{Terms, add_terms, boxes};
+pub(crate) use response::{Term, Terms, add_terms, boxes};
 pub use shapers::{Impulse, Impulses, MAX_IMPULSES};
