@@ -69,7 +69,15 @@ fn the_counter_counts() {
 #[test]
 fn the_tick_stays_below_2000_instructions_on_the_corner_path() {
     let Some(counts) = counts() else { return };
-    for filter in ["fir-zvd", "fir-zvd-0.1s", "fir-zvd-1s", "ei"] {
+    for filter in [
+        "fir-zvd",
+        "fir-zvd-0.1s",
+        "fir-zvd-1s",
+        "ei",
+        "s-curve",
+        "at-63",
+        "at-137",
+    ] {
         let tick = counts[&format!("tick/corner-path/{filter}")];
         assert!((500..=2000).contains(&tick), "{filter}: {tick}");
     }
@@ -122,6 +130,9 @@ fn a_deltas_tick_stays_below_2500_instructions() {
     let Some(counts) = counts() else { return };
     println!("{counts:?}");
     assert!((1000..=2500).contains(&counts["tick/delta"]), "{counts:?}");
+    // two arcs in flight all the time
+    let arcs = counts["tick/delta-arcs"];
+    assert!((1000..=3200).contains(&arcs), "{arcs}");
     assert!((300..=1200).contains(&counts["joint-state/delta"]));
     assert!((200..=1200).contains(&counts["forward/delta"]));
 }

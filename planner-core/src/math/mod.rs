@@ -12,7 +12,7 @@ mod single;
 
 pub use atan2::{PI_Q29, atan2};
 pub use root::{root, rsqrt, sine_from_cosine};
-pub use sign_change::{Bracket, MAX_EVALUATIONS, sign_change};
+pub use sign_change::{Bracket, MAX_EVALUATIONS, sign_change, straight_sign_change};
 pub use sin_cos::{sin_cos, turns};
 pub use single::{sin_cos_f32, sqrt_f32};
 

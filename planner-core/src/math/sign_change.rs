@@ -16,15 +16,35 @@ pub struct Bracket {
 /// Advances in Engineering Software 28, 1997): a smooth function takes 6 to 9 evaluations,
 /// one that jumps no more than [`MAX_EVALUATIONS`].
 pub fn sign_change(
+    function: impl FnMut(f32) -> f32,
+    low: (f32, f32),
+    high: (f32, f32),
+    width: f32,
+) -> Bracket {
+    narrow(function, low, high, width, 0.5)
+}
+
+/// The same for a function that is nearly straight: the first guess takes it for straight.
+pub fn straight_sign_change(
+    function: impl FnMut(f32) -> f32,
+    low: (f32, f32),
+    high: (f32, f32),
+    width: f32,
+) -> Bracket {
+    narrow(function, low, high, width, low.1 / (low.1 - high.1))
+}
+
+/// `fraction` of the bracket is the first guess.
+fn narrow(
     mut function: impl FnMut(f32) -> f32,
     (low, value_low): (f32, f32),
     (high, value_high): (f32, f32),
     width: f32,
+    mut fraction: f32,
 ) -> Bracket {
     // b is the newest point, a the other end of the bracket, c the point that left it
     let (mut a, mut fa) = (low, value_low);
     let (mut b, mut fb) = (high, value_high);
-    let mut fraction = 0.5;
     for _ in 0..MAX_EVALUATIONS {
         let span = b - a;
         if span.abs() <= width {
