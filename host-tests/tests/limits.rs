@@ -4,12 +4,14 @@
 use host_tests::checker::limits::{Arm, JointRow, Rates, rates};
 use host_tests::checker::{CheckOptions, Program, TraceRow, check};
 use host_tests::random_program::{Shape, random_program};
-use host_tests::software_loop::{Controller, run};
+use host_tests::software_loop::{Controller, ProgramError, run};
 use host_tests::trace::{joints, pose};
 use planner_core::config::{Robot, RobotConfig};
+use planner_core::hop::HopError;
 use planner_core::kinematics::JointRange;
 use planner_core::limits::{LimitsConfig, MotionLimits};
 use planner_core::motion::{DelayLines, Order, Setpoint};
+use planner_core::planner::Cause;
 use planner_core::prefilter::Kind;
 use planner_core::queue::SegmentQueue;
 use rand::{RngExt, SeedableRng};
@@ -437,4 +439,22 @@ fn the_tolerance_holds_with_limits_too() {
             report.max_path_deviation_mm
         );
     }
+}
+
+#[test]
+fn a_hop_is_refused_where_limits_are_set() {
+    const PROGRAM: &str = "G0 X200 Y0\nM103 X240 Y20 Z5\nM2";
+    let hop = |limits: &str| {
+        let robot = robot(|config| config.set_all(limits).expect("settings that exist"));
+        run(&robot, PROGRAM, |_| {})
+    };
+    let refused = hop("joint1-velocity=90").expect_err("a hop keeps no limits");
+    let ProgramError::Line(error) = refused else {
+        panic!("{refused}");
+    };
+    assert_eq!(
+        (error.line, error.cause),
+        (2, Cause::Hop(HopError::Limited))
+    );
+    hop("").expect("without limits it hops");
 }
