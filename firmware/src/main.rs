@@ -112,7 +112,10 @@ fn motion(robot: &Robot, segments: SegmentConsumer<'static>) -> &'static mut Mot
 }
 
 #[inline(never)]
-fn planner(robot: &'static mut Robot, segments: SegmentProducer<'static>) -> &'static mut Planner<'static> {
+fn planner(
+    robot: &'static mut Robot,
+    segments: SegmentProducer<'static>,
+) -> &'static mut Planner<'static> {
     static PLANNER: StaticCell<Planner<'static>> = StaticCell::new();
     PLANNER.init_with(|| Planner::new(robot, segments))
 }
@@ -153,9 +156,7 @@ async fn sample_task(link: &'static Link, port: SampleIn) {
 /// The future itself, not one that awaits it: that would hold its arguments twice, and its
 /// first poll would move it by way of the stack.
 #[embassy_executor::task]
-fn command_task(
-    commands: Commands<CommandIn, CommandOut, BoardFlash>,
-) -> impl Future<Output = ()> {
+fn command_task(commands: Commands<CommandIn, CommandOut, BoardFlash>) -> impl Future<Output = ()> {
     command::run(commands)
 }
 
