@@ -21,10 +21,10 @@ const CORNERING_WIDTH_S: f32 = 1e-5;
 const CROSSING_WIDTH: f32 = 1e-3;
 
 /// Samples of the deviation on either side of the crossing, beside an arc.
-const SAMPLES: usize = 3;
+const SAMPLES: usize = 2;
 
 /// What the samples of the deviation are multiplied with, for what lies between them.
-const SAMPLING: f32 = 1.25;
+const SAMPLING: f32 = 1.4;
 
 /// How a corner is to be passed.
 #[derive(Clone, Copy, Debug, PartialEq)]
