@@ -28,6 +28,10 @@ const RESOLUTION_MM: f32 = 2e-5;
 /// A segment of so long lasts a tick at the highest rate.
 const SHORTEST_HURRIED: TickTime = 2 * ONE_TICK;
 
+/// How close to a jump of the velocity, in ticks, the trace may miss the closest approach: a jump
+/// is split over two ticks, and the trace goes straight beside them.
+const JUMP_TICKS: f32 = 2.25;
+
 /// One control tick in seconds.
 const TICK: f32 = TICK_S as f32;
 
@@ -518,8 +522,8 @@ fn turn(arriving: &Side, leaving: &Side) -> f32 {
 /// Where the velocity turns by `Δv` within a tick, straight lines between ticks pass the
 /// turning point by up to `Δv T_s / 4`, and raw feedrates that change between ticks are seen
 /// at ticks only. With a box in the prefilter that makes about a micrometre, and a margin of
-/// twice the box's change within a tick is kept. A pure shaper lets the velocity jump: there the margin
-/// is taken only if the closest approach is within a tick of a jump.
+/// twice the box's change within a tick is kept. A pure shaper lets the velocity jump: there the
+/// margin is taken only if the closest approach is within [`JUMP_TICKS`] of a jump.
 fn solve_sampled(robot: &Robot, arriving: &Side, leaving: &Side, tolerance_mm: f32) -> Corner {
     let solve = |margin_mm: f32| {
         corner::solve(
@@ -539,7 +543,8 @@ fn solve_sampled(robot: &Robot, arriving: &Side, leaving: &Side, tolerance_mm: f
     let corner = solve(0.0);
     let since_start = corner.approach_s - corner.dwell_s;
     let until_end = corner.deceleration_s - corner.approach_s;
-    let change = |response: &Response, t: f32| response.at(t + TICK).0 - response.at(t - TICK).0;
+    let near = JUMP_TICKS * TICK;
+    let change = |response: &Response, t: f32| response.at(t + near).0 - response.at(t - near).0;
     let change_mm_s = arriving.feed_mm_s * change(&robot.decelerating, until_end)
         + leaving.feed_mm_s * change(&robot.accelerating, since_start);
     if change_mm_s > 0.0 {
