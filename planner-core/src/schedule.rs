@@ -22,15 +22,14 @@ use crate::rate::Rate;
 use crate::raw::{LONGEST_S, ONE_TICK, Pace, RawSegment, TickTime, tick_time};
 use crate::units::TICK_S;
 
-/// What the fixed-point trace can miss a point by, in mm: ten times its resolution.
-const RESOLUTION_MM: f32 = 2e-5;
+/// What the fixed-point trace can miss a point by, in mm: twenty times its resolution.
+const RESOLUTION_MM: f32 = 4e-5;
 
 /// A segment of so long lasts a tick at the highest rate.
 const SHORTEST_HURRIED: TickTime = 2 * ONE_TICK;
 
-/// How close to a jump of the velocity, in ticks, the trace may miss the closest approach: a jump
-/// is split over two ticks, and the trace goes straight beside them.
-const JUMP_TICKS: f32 = 2.25;
+/// How close to a jump of the velocity, in ticks, the trace may miss the closest approach.
+const JUMP_TICKS: f32 = 1.0;
 
 /// One control tick in seconds.
 const TICK: f32 = TICK_S as f32;
