@@ -1,73 +1,18 @@
 //! The delta's margin walk against dense sampling of circles and spheres in `f64`.
 
+#[path = "support/curves.rs"]
+mod curves;
 #[path = "support/delta.rs"]
 mod geometry;
 
-use std::cell::Cell;
 use std::f64::consts::PI;
 
+use curves::{Arc, Line};
 use geometry::Geometry;
 use planner_core::kinematics::{
     Curve, Delta, DeltaConfig, JointRange, PoseError, SegmentError, Travel,
 };
 use proptest::prelude::*;
-
-/// A line that counts how often it is sampled.
-struct Line {
-    from: [f64; 4],
-    to: [f64; 4],
-    samples: Cell<u32>,
-}
-
-impl Line {
-    fn new(from: [f64; 4], to: [f64; 4]) -> Self {
-        Self {
-            from,
-            to,
-            samples: Cell::new(0),
-        }
-    }
-}
-
-impl Curve for Line {
-    fn length_mm(&self) -> f64 {
-        (0..3)
-            .map(|i| (self.to[i] - self.from[i]).powi(2))
-            .sum::<f64>()
-            .sqrt()
-    }
-
-    fn pose(&self, u: f64) -> [f64; 4] {
-        self.samples.set(self.samples.get() + 1);
-        std::array::from_fn(|i| self.from[i] + (self.to[i] - self.from[i]) * u)
-    }
-}
-
-/// A helix.
-struct Arc {
-    center: [f64; 4],
-    radius: f64,
-    start: f64,
-    sweep: f64,
-    climb: f64,
-}
-
-impl Curve for Arc {
-    fn length_mm(&self) -> f64 {
-        (self.radius * self.sweep).hypot(self.climb)
-    }
-
-    fn pose(&self, u: f64) -> [f64; 4] {
-        let (s, c) = (self.start + self.sweep * u).sin_cos();
-        let [x, y, z, yaw] = self.center;
-        [
-            x + self.radius * c,
-            y + self.radius * s,
-            z + self.climb * u,
-            yaw,
-        ]
-    }
-}
 
 struct Oracle {
     config: DeltaConfig,
@@ -195,7 +140,7 @@ proptest! {
     ) {
         let [x, y, z, _] = center;
         let center = [x * 0.6, y * 0.6, z, 0.0];
-        agree(&config, &Arc { center, radius, start, sweep, climb })?;
+        agree(&config, &Arc { center, radius, start, sweep, climb, turn: 0.0 })?;
     }
 }
 

@@ -1,78 +1,14 @@
 //! The margin walk against dense sampling of the textbook's formulas in `f64`.
 
+#[path = "support/curves.rs"]
+mod curves;
+
+use curves::{Arc, Line};
 use planner_core::kinematics::{
-    Curve, Elbow, JointRange, PoseError, Scara, ScaraConfig, SegmentError, Travel,
+    Curve, Elbow, JointRange, PoseError, Scara, ScaraConfig, SegmentError,
 };
 use proptest::prelude::*;
-use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
-
-/// A line that counts how often it is sampled, and may hide that it knows its travel.
-struct Line {
-    from: [f64; 4],
-    to: [f64; 4],
-    samples: Cell<u32>,
-}
-
-impl Line {
-    fn new(from: [f64; 4], to: [f64; 4]) -> Self {
-        Self {
-            from,
-            to,
-            samples: Cell::new(0),
-        }
-    }
-}
-
-impl Curve for Line {
-    fn length_mm(&self) -> f64 {
-        (0..3)
-            .map(|i| (self.to[i] - self.from[i]).powi(2))
-            .sum::<f64>()
-            .sqrt()
-    }
-
-    fn pose(&self, u: f64) -> [f64; 4] {
-        self.samples.set(self.samples.get() + 1);
-        std::array::from_fn(|i| self.from[i] + (self.to[i] - self.from[i]) * u)
-    }
-
-    fn travel(&self) -> Travel {
-        let [x, y, z, c] = std::array::from_fn(|i| (self.to[i] - self.from[i]).abs());
-        Travel {
-            xy_mm: x.hypot(y) as f32,
-            z_mm: z as f32,
-            c_deg: c as f32,
-        }
-    }
-}
-
-/// A helix, with the default travel.
-struct Arc {
-    center: [f64; 2],
-    radius: f64,
-    start: f64,
-    sweep: f64,
-    climb: f64,
-    turn: f64,
-}
-
-impl Curve for Arc {
-    fn length_mm(&self) -> f64 {
-        (self.radius * self.sweep).hypot(self.climb)
-    }
-
-    fn pose(&self, u: f64) -> [f64; 4] {
-        let (s, c) = (self.start + self.sweep * u).sin_cos();
-        let [x, y] = self.center;
-        [
-            x + self.radius * c,
-            y + self.radius * s,
-            self.climb * u,
-            self.turn * u,
-        ]
-    }
-}
 
 /// How far beyond each limit: radius (mm), joint 1, joint 3 (mm), joint 4 (rad), seam (rad).
 struct Oracle {
@@ -240,7 +176,7 @@ proptest! {
         start in -PI..PI, sweep in -7.0..7.0_f64, climb in -60.0..60.0_f64, turn in -300.0..300.0_f64,
     ) {
         let [x, y, ..] = center;
-        agree(&config, &Arc { center: [x * 0.7, y * 0.7], radius, start, sweep, climb, turn })?;
+        agree(&config, &Arc { center: [x * 0.7, y * 0.7, 0.0, 0.0], radius, start, sweep, climb, turn })?;
     }
 }
 
@@ -267,7 +203,7 @@ fn joint1_cannot_jump() {
     config.joint_limits[3] = JointRange::symmetric(1080.0);
     let scara = Scara::new(&config).unwrap();
     let circle = |start, sweep| Arc {
-        center: [0.0, 0.0],
+        center: [0.0; 4],
         radius: 250.0,
         start,
         sweep,
@@ -306,7 +242,7 @@ fn corner_path_is_clear() {
         })
         .unwrap();
         let arc = Arc {
-            center: [225.0, 0.0],
+            center: [225.0, 0.0, 0.0, 0.0],
             radius: 45.0,
             start: PI,
             sweep: PI / 2.0,
