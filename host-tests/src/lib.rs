@@ -12,6 +12,7 @@ pub mod bridge;
 pub mod checker;
 pub mod commands;
 pub mod emulator;
+pub mod judged_run;
 pub mod limit_use;
 pub mod link;
 pub mod machine;

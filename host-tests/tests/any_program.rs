@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use host_tests::any_program::{ARM, any_program, chord_circle};
 use host_tests::checker::{CheckOptions, Program, TraceRow, check, tolerance_use};
+use host_tests::judged_run::rows;
 use host_tests::oracle::Prefilter;
 use host_tests::software_loop::run;
 use planner_core::config::{Robot, RobotConfig};
@@ -25,23 +26,11 @@ fn robot(change: impl FnOnce(&mut RobotConfig)) -> Robot {
 }
 
 fn trace(robot: &Robot, program: &str) -> Vec<TraceRow> {
-    let mut rows = Vec::new();
-    let result = run(robot, program, |setpoint| {
-        let pose = setpoint.pose;
-        rows.push(TraceRow {
-            time_s: f64::from(rows.len() as u32) * TICK_S,
-            pose: [
-                pose.x.to_num(),
-                pose.y.to_num(),
-                pose.z.to_num(),
-                pose.c.to_num(),
-            ],
-        });
-    });
-    if let Err(error) = result {
+    let mut all = Vec::new();
+    if let Err(error) = run(robot, program, |setpoint| all.push(*setpoint)) {
         panic!("{error}\n{program}");
     }
-    rows
+    rows(&all)
 }
 
 fn prefilter(robot: &Robot) -> Prefilter {

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use host_tests::checker::TraceRow;
 use host_tests::checker::hops::{HopDefaults, hops, vertical_deviations_mm};
+use host_tests::judged_run::rows;
 use host_tests::machine::Machine;
 use host_tests::payload_search::{HopRun, Limit, fastest, run};
 use host_tests::plant::PayloadConfig;
@@ -175,7 +176,7 @@ enum Meanwhile {
 fn command(robot: &Robot, program: &str, meanwhile: Meanwhile) -> Vec<TraceRow> {
     let mut queue = SegmentQueue::new();
     let mut filters = Box::new(DelayLines::new());
-    let mut rows = Vec::new();
+    let mut all = Vec::new();
     Controller::new(&mut robot.clone(), &mut queue, &mut filters)
         .run_with_orders(
             program,
@@ -189,21 +190,12 @@ fn command(robot: &Robot, program: &str, meanwhile: Meanwhile) -> Vec<TraceRow> 
                 _ => None,
             },
             |setpoint| {
-                let pose = setpoint.pose;
-                rows.push(TraceRow {
-                    time_s: rows.len() as f64 * 1e-3,
-                    pose: [
-                        pose.x.to_num(),
-                        pose.y.to_num(),
-                        pose.z.to_num(),
-                        pose.c.to_num(),
-                    ],
-                });
+                all.push(*setpoint);
                 assert_ne!(setpoint.state, MotionState::Paused);
             },
         )
         .unwrap();
-    rows
+    rows(&all)
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What the planner promises, on random programs, judged by the independent checker.
 
-use host_tests::checker::{CheckOptions, Program, TraceRow, check};
+use host_tests::judged_run::{report, rows};
 use host_tests::oracle::{Path, Prefilter, path::corner_path};
 use host_tests::random_program::{Shape, random_program};
 use host_tests::software_loop::run;
@@ -22,25 +22,6 @@ fn setpoints(robot: &Robot, program: &str) -> Vec<Setpoint> {
     all
 }
 
-fn trace(setpoints: &[Setpoint]) -> Vec<TraceRow> {
-    setpoints
-        .iter()
-        .zip(0_u32..)
-        .map(|(setpoint, tick)| {
-            let pose = setpoint.pose;
-            TraceRow {
-                time_s: f64::from(tick) * TICK_S,
-                pose: [
-                    pose.x.to_num(),
-                    pose.y.to_num(),
-                    pose.z.to_num(),
-                    pose.c.to_num(),
-                ],
-            }
-        })
-        .collect()
-}
-
 #[test]
 fn the_command_is_the_continuous_solution() {
     // At full stops the dwell is the prefilter's length on both sides, so that times agree.
@@ -54,7 +35,7 @@ fn the_command_is_the_continuous_solution() {
         let oracle = Path::uniform(&corner_path(), 160.0, &prefilter, 0.0);
         let schedule = oracle.schedule();
         let mut worst_mm = 0.0_f64;
-        for row in trace(&setpoints(&robot, program)) {
+        for row in rows(&setpoints(&robot, program)) {
             let exact = schedule.pose(row.time_s);
             for (got, want) in row.pose.into_iter().zip(exact) {
                 worst_mm = worst_mm.max((got - want).abs());
@@ -98,13 +79,8 @@ fn the_tolerance_holds_on(seeds: std::ops::Range<u64>) {
                 ..Shape::default()
             },
         );
-        let parsed = Program::parse(&program).expect("the checker reads it");
-        let options = CheckOptions {
-            rapid_mm_s: 160.0,
-            tolerance_mm: robot.config.corner_tolerance_mm.into(),
-            ..CheckOptions::default()
-        };
-        let report = check(&parsed, &trace(&setpoints(&robot, &program)), &options);
+        let report = report(&robot, &program, &setpoints(&robot, &program));
+        let report = report.expect("the checker reads it");
         // Without a box the velocity jumps within a tick, in which the tool moves 0.4 mm: the
         // trace then turns up to half of that before a reversal's tip.
         let allowance_mm = if kind.lets_velocity_jump() { 0.2 } else { 1e-3 };

@@ -1,15 +1,14 @@
 //! What these tests share.
 
-use std::collections::BTreeMap;
-
-use host_tests::checker::{CheckOptions, Program, Report, TraceRow, check};
+use host_tests::checker::Report;
+use host_tests::judged_run;
+pub use host_tests::judged_run::Orders;
 use host_tests::oracle::Prefilter;
-use host_tests::software_loop::Controller;
+pub use host_tests::trace::pose;
 use host_tests::vector::{norm, scale, sub, xyz};
 use planner_core::config::{Robot, RobotConfig};
-use planner_core::motion::{DelayLines, Order, Setpoint};
+use planner_core::motion::Setpoint;
 use planner_core::prefilter::{Kind, PrefilterConfig};
-use planner_core::queue::SegmentQueue;
 
 pub const CORNER_PATH: &str = include_str!("../../programs/corner-path.gcode");
 
@@ -32,54 +31,14 @@ pub fn prefilter(robot: &Robot) -> Prefilter {
     .expect("both have the same names")
 }
 
-/// Orders before the ticks of these numbers.
-pub type Orders = BTreeMap<usize, Order>;
-
 /// Runs a program to its end with orders on the way.
 pub fn setpoints(robot: &Robot, program: &str, orders: &Orders) -> Vec<Setpoint> {
-    let mut queue = SegmentQueue::new();
-    let mut filters = Box::new(DelayLines::new());
-    let mut all = Vec::new();
-    Controller::new(&mut robot.clone(), &mut queue, &mut filters)
-        .run_with_orders(
-            program,
-            |tick| orders.get(&tick).copied(),
-            |setpoint| all.push(*setpoint),
-        )
-        .expect("the program runs");
-    all
-}
-
-pub fn pose(setpoint: &Setpoint) -> [f64; 4] {
-    let pose = setpoint.pose;
-    [
-        pose.x.to_num(),
-        pose.y.to_num(),
-        pose.z.to_num(),
-        pose.c.to_num(),
-    ]
-}
-
-pub fn rows(setpoints: &[Setpoint]) -> Vec<TraceRow> {
-    setpoints
-        .iter()
-        .zip(0_u32..)
-        .map(|(setpoint, tick)| TraceRow {
-            time_s: f64::from(tick) * TICK_S,
-            pose: pose(setpoint),
-        })
-        .collect()
+    judged_run::setpoints(robot, program, orders).expect("the program runs")
 }
 
 /// What the checker finds, with the robot's own tolerance and rapids.
 pub fn report(robot: &Robot, program: &str, setpoints: &[Setpoint]) -> Report {
-    let program = Program::parse(program).expect("the checker reads it");
-    let options = CheckOptions {
-        rapid_mm_s: robot.config.rapid_mm_s.into(),
-        tolerance_mm: robot.config.corner_tolerance_mm.into(),
-        ..CheckOptions::default()
-    };
-    check(&program, &rows(setpoints), &options)
+    judged_run::report(robot, program, setpoints).expect("the checker reads it")
 }
 
 /// What these tests go through: the published prefilters, and of the others the one with the

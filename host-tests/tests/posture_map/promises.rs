@@ -1,6 +1,5 @@
 //! What the planner promises holds with a map too, as the independent checker judges it.
 
-use host_tests::checker::{CheckOptions, Program, Report, TraceRow, check};
 use host_tests::random_program::{Shape, random_program};
 use planner_core::config::Robot;
 use planner_core::motion::{Order, Setpoint};
@@ -9,33 +8,7 @@ use planner_core::prefilter::Kind;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::support::{Orders, TICK_S, robot, setpoints};
-
-fn rows(setpoints: &[Setpoint]) -> Vec<TraceRow> {
-    let row = |(setpoint, tick): (&Setpoint, u32)| {
-        let pose = setpoint.pose;
-        TraceRow {
-            time_s: f64::from(tick) * TICK_S,
-            pose: [
-                pose.x.to_num(),
-                pose.y.to_num(),
-                pose.z.to_num(),
-                pose.c.to_num(),
-            ],
-        }
-    };
-    setpoints.iter().zip(0..).map(row).collect()
-}
-
-fn report(robot: &Robot, program: &str, setpoints: &[Setpoint]) -> Report {
-    let program = Program::parse(program).expect("the checker reads it");
-    let options = CheckOptions {
-        rapid_mm_s: robot.config.rapid_mm_s.into(),
-        tolerance_mm: robot.config.corner_tolerance_mm.into(),
-        ..CheckOptions::default()
-    };
-    check(&program, &rows(setpoints), &options)
-}
+use crate::support::{Orders, report, robot, setpoints};
 
 /// Kind, method and tolerance of a seed, and a program.
 fn scenario(seed: u64) -> (Robot, String) {

@@ -1,12 +1,11 @@
 //! The robot of these tests and its map.
 
-use std::collections::BTreeMap;
-
-use host_tests::software_loop::Controller;
+use host_tests::checker::Report;
+use host_tests::judged_run;
+pub use host_tests::judged_run::Orders;
 use planner_core::config::{Robot, RobotConfig};
-use planner_core::motion::{DelayLines, Order, Setpoint};
+use planner_core::motion::Setpoint;
 use planner_core::posture::{MAP_NODES, MapNode, ModeMapConfig};
-use planner_core::queue::SegmentQueue;
 
 pub const TICK_S: f64 = 1e-3;
 
@@ -48,20 +47,12 @@ pub fn robot(change: impl FnOnce(&mut RobotConfig)) -> Robot {
     Robot::new(&config).expect("the settings are within range")
 }
 
-/// Orders before the ticks of these numbers.
-pub type Orders = BTreeMap<usize, Order>;
-
 /// Runs a program to its end with orders on the way.
 pub fn setpoints(robot: &Robot, program: &str, orders: &Orders) -> Vec<Setpoint> {
-    let mut queue = SegmentQueue::new();
-    let mut filters = Box::new(DelayLines::new());
-    let mut all = Vec::new();
-    Controller::new(&mut robot.clone(), &mut queue, &mut filters)
-        .run_with_orders(
-            program,
-            |tick| orders.get(&tick).copied(),
-            |setpoint| all.push(*setpoint),
-        )
-        .expect("the program runs");
-    all
+    judged_run::setpoints(robot, program, orders).expect("the program runs")
+}
+
+/// What the checker finds, with the robot's own tolerance and rapids.
+pub fn report(robot: &Robot, program: &str, setpoints: &[Setpoint]) -> Report {
+    judged_run::report(robot, program, setpoints).expect("the checker reads it")
 }
