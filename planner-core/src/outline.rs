@@ -15,6 +15,17 @@ use crate::math::sqrt_f32;
 /// Corners that can be left out between two knots; with more, a knot is made.
 const LEFT_OUT: usize = 16;
 
+/// Over how much of the length that the prefilter spreads the slow mean of the curvature goes, and
+/// the fast one.
+const SLOW: f32 = 1.4;
+const FAST: f32 = 0.12;
+
+/// How far a rising curvature is followed ahead, in differences between the two means.
+const AHEAD: f32 = 1.4;
+
+/// By how much more the next corner may turn than the latest ones.
+const SHARPER: f32 = 1.2;
+
 /// A corner left out, seen from the knot before it.
 #[derive(Clone, Copy, Debug)]
 struct Point {
@@ -34,6 +45,23 @@ pub struct Joint {
     pub loose_mm: f32,
 }
 
+/// How much a path turns per mm: two means over its latest part.
+#[derive(Clone, Copy, Debug)]
+struct Turning {
+    slow_per_mm: f32,
+    fast_per_mm: f32,
+    /// The turn at the latest knot.
+    latest: f32,
+}
+
+impl Turning {
+    /// The slow mean lags behind the fast one, by as much as the curvature has risen in between.
+    fn ahead_per_mm(&self) -> f32 {
+        let rise = (self.fast_per_mm - self.slow_per_mm).max(0.0);
+        self.fast_per_mm.max(self.slow_per_mm) + AHEAD * rise
+    }
+}
+
 /// The last piece of an outline.
 #[derive(Clone, Debug, Default)]
 pub struct Outline {
@@ -47,8 +75,8 @@ pub struct Outline {
     loose_mm: f32,
     /// `(Γ̃' , length)` of the piece before the last knot; none at the start of the path.
     before: Option<([f32; 3], f32)>,
-    /// Turn per mm of late; none before the first corner.
-    curvature_per_mm: Option<f32>,
+    /// How the path has turned; nothing before the first corner.
+    turning: Option<Turning>,
 }
 
 impl Outline {
@@ -129,24 +157,40 @@ impl Outline {
         self.time_s += time_s;
     }
 
-    /// How much the path turns per mm, if its next line is `length_mm` long and begins with a
-    /// turn: as it did of late, over about the length that the prefilter spreads.
+    /// How much the path is about to turn per mm, if its next line is `length_mm` long and begins
+    /// with a turn: as it did of late, and more where it turns more and more. No corner is
+    /// expected to turn by more than the latest two.
     pub fn curvature_per_mm(&self, turn: f32, length_mm: f32) -> f32 {
-        self.curvature_per_mm.unwrap_or(turn / length_mm)
+        let here_per_mm = turn / length_mm;
+        self.turning.map_or(here_per_mm, |turning| {
+            let latest_per_mm = SHARPER * turning.latest.max(turn) / length_mm;
+            turning.ahead_per_mm().min(latest_per_mm)
+        })
     }
 
     /// Takes note of the turns at the last knot and at the one that is made now.
     fn learn(&mut self, turn: f32, length_mm: f32, spread_mm: f32) {
-        let Some(known_per_mm) = self.curvature_per_mm else {
-            self.curvature_per_mm = Some(2.0 * turn / (self.length_mm + length_mm));
+        let slope = self.slope();
+        let Some(turning) = &mut self.turning else {
+            let per_mm = 2.0 * turn / (self.length_mm + length_mm);
+            self.turning = Some(Turning {
+                slow_per_mm: per_mm,
+                fast_per_mm: per_mm,
+                latest: turn,
+            });
             return;
         };
-        if let Some((before, before_mm)) = self.before {
-            let both_mm = (before_mm + self.length_mm) / 2.0;
-            let latest_per_mm = distance(before, self.slope()) / both_mm;
-            let share = both_mm / (both_mm + spread_mm);
-            self.curvature_per_mm = Some(known_per_mm + share * (latest_per_mm - known_per_mm));
-        }
+        turning.latest = turn;
+        let Some((before, before_mm)) = self.before else {
+            return;
+        };
+        let both_mm = (before_mm + self.length_mm) / 2.0;
+        let per_mm = distance(before, slope) / both_mm;
+        let follow = |known_per_mm: &mut f32, over_mm: f32| {
+            *known_per_mm += both_mm / (both_mm + over_mm) * (per_mm - *known_per_mm);
+        };
+        follow(&mut turning.slow_per_mm, SLOW * spread_mm);
+        follow(&mut turning.fast_per_mm, FAST * spread_mm);
     }
 
     /// `Γ̃'` behind the last knot.
