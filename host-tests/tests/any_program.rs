@@ -1,6 +1,7 @@
 //! The tolerance on any program, judged by the independent checker.
 
 use std::f64::consts::TAU;
+use std::fmt::Write;
 
 use host_tests::any_program::{ARM, any_program, chord_circle};
 use host_tests::checker::{CheckOptions, Program, TraceRow, check, tolerance_use};
@@ -169,5 +170,74 @@ fn circles_of_chords_are_hardly_slower_than_the_bound() {
             let slower = circle.slower(kind);
             assert!(slower <= most, "{kind:?}: {slower}");
         }
+    }
+}
+
+/// How much longer a program takes than it would at the feedrate that the bound
+/// `F² σ² κ / 2 = tolerance` allows everywhere, as a part of that time: `curve` yields a place in
+/// mm of the path from 0 to 1, to be walked at 160 mm/s if it may.
+fn slower_than_the_bound(program: &str, tolerance_mm: f32, curve: impl Fn(f64) -> [f64; 2]) -> f64 {
+    const STEPS: u32 = 20_000;
+    let robot = robot(|config| config.corner_tolerance_mm = tolerance_mm);
+    let spread_s = prefilter(&robot).variance_s2().sqrt();
+    let mut bound_s = robot.prefilter().length_s();
+    let place = |step: u32| curve(f64::from(step) / f64::from(STEPS));
+    for step in 1..STEPS {
+        let [before, here, behind] = [step - 1, step, step + 1].map(place);
+        let (u1, u2) = (
+            [here[0] - before[0], here[1] - before[1]],
+            [behind[0] - here[0], behind[1] - here[1]],
+        );
+        let length_mm = u2[0].hypot(u2[1]);
+        let turn = (u1[0] * u2[1] - u1[1] * u2[0]).atan2(u1[0] * u2[0] + u1[1] * u2[1]);
+        let squared = 2.0 * f64::from(tolerance_mm) * length_mm / turn.abs().max(1e-12);
+        bound_s += length_mm / (squared.sqrt() / spread_s).min(160.0);
+    }
+    let rows = trace(&robot, program);
+    let parsed = Program::parse(program).expect("the checker reads it");
+    let used = tolerance_use(&parsed, &rows, tolerance_mm.into(), (ROUNDING_MM, 1e-3));
+    assert!(used.strayed <= 1.0 && used.missed <= 1.0, "{used:?}");
+    let takes_s = (rows.len() - 1) as f64 * TICK_S;
+    println!("{takes_s:.3} s, at the bound {bound_s:.3} s");
+    takes_s / bound_s - 1.0
+}
+
+/// Its curvature grows and falls eightfold, four times.
+fn figure_of_eight(at: f64) -> [f64; 2] {
+    [
+        480.0 + 50.0 * (TAU * at).sin(),
+        40.0 * (2.0 * TAU * at).sin(),
+    ]
+}
+
+fn round(at: f64) -> [f64; 2] {
+    [480.0 + 25.0 * (TAU * at).cos(), 25.0 * (TAU * at).sin()]
+}
+
+#[test]
+fn a_curve_of_chords_is_walked_near_its_bound() {
+    for (count, most) in [(1500, 0.2), (400, 0.2), (150, 0.45)] {
+        let mut program = String::from("G0 X480 Y0\nG1 F9600\n");
+        for i in 1..=count {
+            let [x, y] = figure_of_eight(f64::from(i) / f64::from(count));
+            let _ = writeln!(program, "X{x:.4} Y{y:.4}");
+        }
+        let slower = slower_than_the_bound(&(program + "M2\n"), 0.1, figure_of_eight);
+        assert!((-0.05..=most).contains(&slower), "{count} chords: {slower}");
+    }
+}
+
+/// Each of the arcs is shorter than the prefilter: one at a time they would take 22 s.
+#[test]
+fn a_chain_of_short_arcs_is_walked_near_its_bound() {
+    for (count, most) in [(100, 0.2), (40, 0.2), (16, 0.3)] {
+        let mut program = String::from("G0 X505 Y0\nG1 F9600\n");
+        for i in 0..count {
+            let [x0, y0] = round(f64::from(i) / f64::from(count));
+            let [x, y] = round(f64::from(i + 1) / f64::from(count));
+            let _ = writeln!(program, "G3 X{x:.4} Y{y:.4} I{:.4} J{:.4}", 480.0 - x0, -y0);
+        }
+        let slower = slower_than_the_bound(&(program + "M2\n"), 0.2, round);
+        assert!((-0.05..=most).contains(&slower), "{count} arcs: {slower}");
     }
 }

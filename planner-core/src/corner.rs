@@ -51,6 +51,15 @@ impl CornerRule {
             Self::ToleranceMm(amount) | Self::OverlapPercent(amount) => amount <= 0.0,
         }
     }
+
+    /// With a tolerance so much smaller, down to an exact stop.
+    #[must_use]
+    pub fn tightened(self, by_mm: f32) -> Self {
+        match self {
+            Self::ToleranceMm(tolerance_mm) => Self::ToleranceMm((tolerance_mm - by_mm).max(0.0)),
+            Self::OverlapPercent(_) => self,
+        }
+    }
 }
 
 /// A segment as one of its ends sees it.

@@ -7,6 +7,7 @@ extern crate std;
 pub mod accelerometer;
 mod arcs;
 mod changeover;
+mod chords;
 pub mod config;
 pub mod corner;
 mod dense;

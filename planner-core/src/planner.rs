@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use crate::chords::{self, Chords};
 use crate::config::{ConfigError, Robot, RobotConfig};
 use crate::gcode::{
     self, Command, Defaults, Feed, HopMove, Interpreted, Interpreter, Line, MAX_ACTIONS_A_LINE,
@@ -142,6 +143,8 @@ pub struct Planner<'q> {
     schedule: Schedule<'q>,
     /// Where the joints stand, if a joint move was stopped on its way.
     joints: Option<JointPosition>,
+    /// By how much the last move may stray from its path, having been an arc and become chords.
+    sagitta_mm: f32,
 }
 
 /// A move of the joints that changes the elbow's side.
@@ -165,6 +168,7 @@ impl<'q> Planner<'q> {
             checking: None,
             schedule: Schedule::new(queue),
             joints: None,
+            sagitta_mm: 0.0,
         }
     }
 
@@ -172,11 +176,12 @@ impl<'q> Planner<'q> {
     #[must_use]
     pub fn has_room(&self) -> bool {
         let places = self.schedule.free_places();
+        let needed = MAX_ACTIONS_A_LINE + chords::MOST - 1;
         if self.robot.follower.is_none() {
-            return places >= MAX_ACTIONS_A_LINE;
+            return places >= needed;
         }
         // a change of the prefilter before each move
-        places >= MAX_ACTIONS_A_LINE + 2 && self.schedule.free_kernels() >= KERNELS_A_MOVE
+        places >= needed + 2 && self.schedule.free_kernels() >= KERNELS_A_MOVE
     }
 
     /// Segments that the look-ahead has room for.
@@ -459,8 +464,51 @@ impl<'q> Planner<'q> {
         Ok(self.schedule.hop(&hop, order.line))
     }
 
-    /// Queues a move, with the prefilters that the map asks for.
+    /// Queues a move, a short arc of a chain by chords.
     fn plan_move(&mut self, order: &Move, timing: &Timing) -> bool {
+        let order = Move {
+            corner: order.corner.tightened(self.sagitta_mm),
+            ..*order
+        };
+        let Some(chords) = self.chords(&order, timing) else {
+            self.sagitta_mm = 0.0;
+            return self.plan_segment(&order, timing);
+        };
+        self.sagitta_mm = chords.sagitta_mm as f32;
+        let share = 1.0 / f64::from(chords.count);
+        let mut timing = Timing {
+            duration_s: share * timing.duration_s,
+            shortest_s: share * timing.shortest_s,
+            ..*timing
+        };
+        let mut queued = false;
+        for number in 0..chords.count {
+            let chord = chords.chord(&order, number);
+            if self.robot.limits.is_set() {
+                self.limit(&chord.path, &mut timing);
+            }
+            queued |= self.plan_segment(&chord, &timing);
+        }
+        queued
+    }
+
+    /// The chords that go faster than a move's arc.
+    ///
+    /// An arc that lasts as long as the prefilter has corners far enough apart. A shorter one
+    /// waits for the filters to leave an arc before it, for about half of that.
+    fn chords(&self, order: &Move, timing: &Timing) -> Option<Chords> {
+        let length_s = f64::from(self.robot.accelerating.length_s());
+        if timing.duration_s >= length_s {
+            return None;
+        }
+        let chords = Chords::of(order, self.robot.accelerating.spread_s().into())?;
+        let is_chain = self.sagitta_mm > 0.0 || self.schedule.follows_arc();
+        let is_faster = chords.steady_s <= timing.duration_s + 0.5 * length_s;
+        (is_faster && (is_chain || chords.count == 1)).then_some(chords)
+    }
+
+    /// Queues a line or an arc, with the prefilters that the map asks for.
+    fn plan_segment(&mut self, order: &Move, timing: &Timing) -> bool {
         let (queued, next) = self.queue_move(order, timing);
         if let Some(tuning) = next {
             // its taps have been made before: this does not fail
