@@ -188,7 +188,6 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
                 _ => vec!["hop.acceleration_mm_s2"],
             },
         },
-        ConfigError::LimitsOnDelta => vec!["limits"],
         ConfigError::LimitsOnMap => vec!["map", "limits"],
         ConfigError::Range { name, .. } => match *name {
             "tolerance" => vec!["motion.corner_tolerance_mm"],

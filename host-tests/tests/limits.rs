@@ -1,21 +1,30 @@
 //! Limits of velocity, acceleration and jerk hold at every tick, judged by the independent
 //! checker; and nothing stalls because of them.
 
-use host_tests::checker::limits::{Arm, JointRow, Rates, rates};
+use host_tests::checker::limits::{Arm, Geometry, JointRow, Rates, rates};
 use host_tests::checker::{CheckOptions, Program, TraceRow, check};
 use host_tests::random_program::{Shape, random_program};
 use host_tests::software_loop::{Controller, ProgramError, run};
 use host_tests::trace::{joints, pose};
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::hop::HopError;
-use planner_core::kinematics::JointRange;
+use planner_core::kinematics::{ArmKind, JointRange};
 use planner_core::limits::{LimitsConfig, MotionLimits};
 use planner_core::motion::{DelayLines, Order, Setpoint};
 use planner_core::planner::Cause;
+use planner_core::pose::JointUnit;
 use planner_core::prefilter::Kind;
 use planner_core::queue::SegmentQueue;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+/// Random programs that an arm can reach.
+fn shape_of(arm: ArmKind) -> Shape {
+    match arm {
+        ArmKind::Scara => Shape::default(),
+        ArmKind::Delta => Shape::of_delta(),
+    }
+}
 
 /// By how much a limit may be passed.
 const SPARE: f64 = 1.001;
@@ -42,8 +51,7 @@ fn rates_of(robot: &Robot, all: &[Setpoint], longest_arc_mm: f64) -> Vec<Rates> 
         })
         .collect();
     let arm = Arm {
-        link1_mm: robot.config.scara.link1_mm.into(),
-        link2_mm: robot.config.scara.link2_mm.into(),
+        geometry: Geometry::of(&robot.config),
         step_s: 1e-3,
         longest_arc_mm,
     };
@@ -69,7 +77,10 @@ fn used(robot: &Robot, all: &[Setpoint], longest_arc_mm: f64) -> [[f64; 3]; 6] {
     let mut used = [[0.0_f64; 3]; 6];
     for found in rates_of(robot, all, longest_arc_mm) {
         let parts = [0, 1, 2, 3].map(|joint| {
-            let unit = if joint == 2 { 1.0 } else { turn };
+            let unit = match robot.arm.kind().joint_units()[joint] {
+                JointUnit::Angle => turn,
+                JointUnit::Length => 1.0,
+            };
             let limits = highest(&config.joints[joint], unit);
             (found.joints[joint], found.joints_noise[joint], limits)
         });
@@ -93,7 +104,7 @@ fn largest(used: &[[f64; 3]; 6]) -> f64 {
 }
 
 /// A random choice of limits that bind at the feeds of random programs.
-fn random_limits(rng: &mut ChaCha8Rng) -> LimitsConfig {
+fn random_limits(rng: &mut ChaCha8Rng, kind: ArmKind) -> LimitsConfig {
     let mut config = LimitsConfig::default();
     let mut some = |from: f32, to: f32, often: f64| {
         if rng.random_bool(often) {
@@ -102,14 +113,22 @@ fn random_limits(rng: &mut ChaCha8Rng) -> LimitsConfig {
             0.0
         }
     };
-    for joint in [0, 1, 3] {
+    let turning = match kind {
+        ArmKind::Scara => [0, 1, 3],
+        ArmKind::Delta => [0, 1, 2],
+    };
+    for joint in turning {
         config.joints[joint] = MotionLimits {
             velocity: some(5.0, 80.0, 0.5),
             acceleration: some(20.0, 500.0, 0.5),
             jerk: some(300.0, 10_000.0, 0.4),
         };
     }
-    config.joints[2] = MotionLimits {
+    let alone = match kind {
+        ArmKind::Scara => 2,
+        ArmKind::Delta => 3,
+    };
+    config.joints[alone] = MotionLimits {
         velocity: some(2.0, 50.0, 0.4),
         acceleration: some(20.0, 500.0, 0.4),
         jerk: some(300.0, 10_000.0, 0.3),
@@ -129,23 +148,35 @@ fn random_limits(rng: &mut ChaCha8Rng) -> LimitsConfig {
 
 #[test]
 fn no_limit_is_passed_on_random_programs() {
-    no_limit_is_passed_on(0..70);
+    no_limit_is_passed_on(ArmKind::Scara, 0..70);
+}
+
+#[test]
+fn no_limit_is_passed_on_random_delta_programs() {
+    no_limit_is_passed_on(ArmKind::Delta, 0..60);
+}
+
+#[test]
+#[ignore = "long; runs with --include-ignored"]
+fn no_limit_is_passed_on_a_thousand_random_delta_programs() {
+    no_limit_is_passed_on(ArmKind::Delta, 60..1060);
 }
 
 #[test]
 #[ignore = "long; runs with --include-ignored"]
 fn no_limit_is_passed_on_a_thousand_random_programs() {
-    no_limit_is_passed_on(70..1070);
+    no_limit_is_passed_on(ArmKind::Scara, 70..1070);
 }
 
-fn no_limit_is_passed_on(seeds: std::ops::Range<u64>) {
+fn no_limit_is_passed_on(arm: ArmKind, seeds: std::ops::Range<u64>) {
     let mut binding = 0;
     let count = seeds.end - seeds.start;
     for seed in seeds {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let kind = Kind::ALL[seed as usize % Kind::ALL.len()];
-        let limits = random_limits(&mut rng);
+        let limits = random_limits(&mut rng, arm);
         let robot = robot(|config| {
+            config.arm = arm;
             config.prefilter.kind = kind;
             config.prefilter.frequency_hz = 4.0 + (seed % 11) as f32;
             config.limits = limits;
@@ -156,7 +187,7 @@ fn no_limit_is_passed_on(seeds: std::ops::Range<u64>) {
             Shape {
                 smooth: if seed % 3 == 0 { 0.9 } else { 0.3 },
                 longest_mm,
-                ..Shape::default()
+                ..shape_of(arm)
             },
         );
         // a sweep of 6 rad around a centre half the longest length away

@@ -11,7 +11,7 @@ use crate::hop::{self, Hop, HopConfig, HopError, HopLimits};
 use crate::kinematics::{Arm, Elbow, PoseError, SegmentError};
 use crate::limits::{Course, Limited};
 use crate::path::{PathSegment, Shape};
-use crate::pose::{JointPosition, Pose};
+use crate::pose::{JointPosition, JointUnit, Pose};
 use crate::posture::{MoveToFollow, MoveTunings, Tuning};
 use crate::prefilter::{Kernel, Prefilter, PrefilterConfig};
 use crate::queue::{KERNELS_A_MOVE, SegmentProducer};
@@ -334,10 +334,14 @@ impl<'q> Planner<'q> {
             return asked_s;
         }
         let mut ways = [0.0; 4];
-        let units = [f64::from(AngleRad::DELTA), f64::from(LengthMm::DELTA)];
         let bits = from.to_bits().into_iter().zip(to.to_bits());
-        for ((way, (from, to)), unit) in ways.iter_mut().zip(bits).zip([0, 0, 1, 0]) {
-            *way = (f64::from(to.abs_diff(from)) * units[unit]) as f32;
+        let units = self.robot.arm.kind().joint_units();
+        for ((way, (from, to)), unit) in ways.iter_mut().zip(bits).zip(units) {
+            let unit = match unit {
+                JointUnit::Angle => f64::from(AngleRad::DELTA),
+                JointUnit::Length => f64::from(LengthMm::DELTA),
+            };
+            *way = (f64::from(to.abs_diff(from)) * unit) as f32;
         }
         let asked = asked_s.max(TICK_S) as f32;
         let (least_s, _) = self.robot.limits.joint_move_s(ways, asked);
@@ -675,7 +679,7 @@ impl<'q> Planner<'q> {
         // what the highest override could make of it
         let hurried_s = (0.5 * timing.duration_s).max(timing.shortest_s);
         let asked_s = hurried_s.max(TICK_S) as f32;
-        let course = Course::new(path);
+        let course = Course::new(path, self.robot.limits.kind());
         (timing.least_s, timing.bound) = self.robot.limits.least_s(&course, asked_s);
     }
 

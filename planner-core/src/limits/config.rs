@@ -16,7 +16,7 @@ pub struct MotionLimits {
 /// All limits of motion; by default there are none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LimitsConfig {
-    /// Of each joint: in °, joint 3 in mm.
+    /// Of each joint: in °, joint 3 of a SCARA in mm.
     pub joints: [MotionLimits; 4],
     /// Of the tool along its path, in mm: tangential, after \[Li23\] Table 4.
     pub path: MotionLimits,
