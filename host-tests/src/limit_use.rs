@@ -99,6 +99,7 @@ pub fn trace_rates(robot: &Robot, trace: &Trace) -> Vec<Rates> {
         geometry: Geometry::of(&robot.config),
         step_s: Trace::time_s(1),
         longest_arc_mm: 0.0,
+        longest_hop_mm: 0.0,
     };
     rates(&rows, &arm)
 }

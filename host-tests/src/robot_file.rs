@@ -179,7 +179,6 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
             FollowError::Shortest(_) => vec!["prefilter.residual_limit", "prefilter.uncertainty"],
         },
         ConfigError::Hop(error) => match error {
-            HopError::Limited => vec!["limits"],
             HopError::Rise { .. } => vec!["hop.rise_mm", "hop.height_mm"],
             HopError::Range { name, .. } => match *name {
                 "hop-height" => vec!["hop.height_mm"],

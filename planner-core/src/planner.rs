@@ -430,7 +430,9 @@ impl<'q> Planner<'q> {
             queued |= self.stand_still(f64::from(duration_s));
         }
         if let Some(order) = hop {
-            queued |= self.plan_hop(order)?;
+            let (planned, slowed) = self.plan_hop(order)?;
+            queued |= planned;
+            limited = slowed;
         }
         for (order, timing) in command.moves().zip(&timings) {
             queued |= timing.duration_s > 0.0 && self.plan_move(order, timing);
@@ -458,9 +460,9 @@ impl<'q> Planner<'q> {
 
     /// Queues a pick-and-place move, with the prefilter that is in force.
     #[inline(never)]
-    fn plan_hop(&mut self, order: &HopMove) -> Result<bool, Cause> {
-        let hop = self.checked_hop(&self.robot.arm, order)?;
-        Ok(self.schedule.hop(&hop, order.line))
+    fn plan_hop(&mut self, order: &HopMove) -> Result<(bool, Option<Limited>), Cause> {
+        let (hop, limited) = self.checked_hop(&self.robot.arm, order)?;
+        Ok((self.schedule.hop(&hop, order.line), limited))
     }
 
     /// Queues a move, with the prefilters that the map asks for.
@@ -619,10 +621,7 @@ impl<'q> Planner<'q> {
     /// A pick-and-place move that the arm can drive: up, across at the top and at the end of the
     /// vertical parts, and down. Not inlined, as [`Planner::elbow_move`].
     #[inline(never)]
-    fn checked_hop(&self, arm: &Arm, order: &HopMove) -> Result<Hop, Cause> {
-        if self.robot.limits.is_set() {
-            return Err(Cause::Hop(HopError::Limited));
-        }
+    fn checked_hop(&self, arm: &Arm, order: &HopMove) -> Result<(Hop, Option<Limited>), Cause> {
         let own = self.robot.config.hop;
         let wanted = HopConfig {
             height_mm: order.height_mm.unwrap_or(own.height_mm),
@@ -631,7 +630,19 @@ impl<'q> Planner<'q> {
             acceleration_mm_s2: order.acceleration_mm_s2.unwrap_or(own.acceleration_mm_s2),
             axes: own.axes,
         };
-        let hop = self.hop_of(order, &wanted).map_err(Cause::Hop)?;
+        wanted.check().map_err(Cause::Hop)?;
+        let mut limits = HopLimits {
+            feed_mm_s: self.robot.config.feed_limit_mm_s,
+            yaw_deg_s: self.robot.config.yaw_limit_deg_s,
+            slowdown: None,
+        };
+        let limited = self.slow_hop(order, &wanted, &mut limits);
+        let peaks = hop::peaks(&order.start, &order.target, &wanted, &limits);
+        let duration_s = peaks.apart_s;
+        if duration_s > LONGEST_S {
+            return Err(Cause::TooSlow { duration_s });
+        }
+        let hop = self.hop_of(order, &wanted, &limits).map_err(Cause::Hop)?;
         for [start, target] in hop.outline(wanted.height_mm) {
             let line = PathSegment {
                 start,
@@ -640,20 +651,51 @@ impl<'q> Planner<'q> {
             };
             arm.check_segment(&line).map_err(Cause::Segment)?;
         }
-        Ok(hop)
+        Ok((hop, limited))
+    }
+
+    /// Slows a pick-and-place move down for the limits of motion, and says for which.
+    #[inline(never)]
+    fn slow_hop(
+        &self,
+        order: &HopMove,
+        wanted: &HopConfig,
+        limits: &mut HopLimits,
+    ) -> Option<Limited> {
+        if !self.robot.limits.is_set() {
+            return None;
+        }
+        let slowed = |slowdown: f64| HopLimits {
+            slowdown: Some(slowdown),
+            ..*limits
+        };
+        let [start, target] = [&order.start, &order.target];
+        let peaks = |slowdown| hop::peaks(start, target, wanted, &slowed(slowdown));
+        let rise = LengthMm::saturating_from_num(wanted.rise_mm);
+        let top = start.z.max(target.z).saturating_add(rise);
+        let found = self.robot.limits.hop_slowdown([start, target], top, peaks);
+        let (asked, takes) = (peaks(1.0), peaks(found.slowdown));
+        let limited = found.bound.map(|bound| Limited {
+            bound,
+            asked_s: asked.apart_s,
+            takes_s: takes.apart_s,
+            length_mm: takes.length_mm,
+        });
+        *limits = slowed(found.slowdown);
+        limited
     }
 
     /// A pick-and-place move with the prefilter that is in force. Not inlined, so that the
     /// prefilter is on the stack for a moment only.
     #[inline(never)]
-    fn hop_of(&self, order: &HopMove, wanted: &HopConfig) -> Result<Hop, HopError> {
-        let config = &self.robot.config;
-        let limits = HopLimits {
-            feed_mm_s: config.feed_limit_mm_s,
-            yaw_deg_s: config.yaw_limit_deg_s,
-        };
+    fn hop_of(
+        &self,
+        order: &HopMove,
+        wanted: &HopConfig,
+        limits: &HopLimits,
+    ) -> Result<Hop, HopError> {
         let prefilter = self.robot.prefilter();
-        hop::plan(order.start, order.target, wanted, &limits, &prefilter)
+        hop::plan(order.start, order.target, wanted, limits, &prefilter)
     }
 
     /// How long a motion takes; zero if it is shorter than anything.

@@ -44,6 +44,8 @@ pub struct Arm {
     pub step_s: f64,
     /// Length of the longest arc that is driven.
     pub longest_arc_mm: f64,
+    /// Length of the longest hop with axes that nothing smooths; 0 if there is none.
+    pub longest_hop_mm: f64,
 }
 
 /// The robot's arms.
@@ -86,12 +88,12 @@ impl Geometry {
         }
     }
 
-    /// How far each joint moves at the most for each mm of the tool.
+    /// How far each joint moves at the most for each mm of the tool and ° of its yaw.
     fn gains(&self, row: &JointRow) -> [f64; 4] {
         match *self {
             Self::Scara { link1_mm, link2_mm } => {
                 let [first, second, both] = scara_gains(row, link1_mm, link2_mm);
-                [first, second, 1.0, both]
+                [first, second, 1.0, both + 1_f64.to_radians()]
             }
             Self::Delta(delta) => {
                 let [first, second, third] = delta.turns_per_mm(row.position);
@@ -118,6 +120,10 @@ const ACCELERATION_BIT: f64 = 1e6 / (1_u64 << 26) as f64;
 /// The progress along an arc counts 2^-30 of it.
 const PROGRESS_BIT: f64 = 1.0 / (1_u64 << 30) as f64;
 
+/// The raw path counts 2^-19 mm; and the progress of a hop is good to some 2^-30.
+const RAW_BIT_MM: f64 = 1.0 / (1 << 19) as f64;
+const HOP_BIT: f64 = 1.0 / (1_u64 << 30) as f64;
+
 /// Relative resolution of accelerations in single precision, after some ten operations.
 const SINGLE: f64 = 1e-6;
 
@@ -129,8 +135,14 @@ pub fn rates(rows: &[JointRow], arm: &Arm) -> Vec<Rates> {
             let [before, now] = [&pair[0], &pair[1]];
             let per_s = 1.0 / arm.step_s;
             let mut found = Rates::default();
-            let resolved =
-                2.0 * ACCELERATION_BIT + 4.0 * PROGRESS_BIT * arm.longest_arc_mm * per_s * per_s;
+            // two accelerations, each from four times half a bit
+            let hop_mm = if arm.longest_hop_mm > 0.0 {
+                4.0 * RAW_BIT_MM + 8.0 * HOP_BIT * arm.longest_hop_mm
+            } else {
+                0.0
+            };
+            let arc_mm = 4.0 * PROGRESS_BIT * arm.longest_arc_mm;
+            let resolved = 2.0 * ACCELERATION_BIT + (arc_mm + hop_mm) * per_s * per_s;
             for joint in 0..4 {
                 let jerk = (now.acceleration[joint] - before.acceleration[joint]) * per_s;
                 found.joints[joint] =
@@ -200,6 +212,7 @@ mod tests {
             },
             step_s: 1e-3,
             longest_arc_mm: 0.0,
+            longest_hop_mm: 0.0,
         };
         let bend: f64 = 1.0;
         let radius = (200.0_f64.powi(2) + 150.0_f64.powi(2) + 60_000.0 * bend.cos()).sqrt();
@@ -228,6 +241,7 @@ mod tests {
             geometry: Geometry::Delta(delta),
             step_s: 1e-3,
             longest_arc_mm: 0.0,
+            longest_hop_mm: 0.0,
         };
         let (radius, rate) = (80.0, 3.0);
         let at = |time_s: f64| {
@@ -269,6 +283,7 @@ mod tests {
             },
             step_s: 1e-3,
             longest_arc_mm: 0.0,
+            longest_hop_mm: 0.0,
         };
         let row = |acceleration| JointRow {
             position: [0.0, 1.5, 0.0, 0.0],

@@ -63,19 +63,24 @@
 //! # Never a stall
 //! Conditions only get easier as the duration grows, and hold in the limit: the region shrinks to
 //! the segment, over which the bounds are finite because the singularity margin has been
-//! checked, and corners are rounded within half of what
-//! the margin leaves. A duration times the largest quotient of left and right side always keeps them.
+//! checked, and because corners are rounded within a part of what it leaves. A duration times the
+//! largest quotient of left and right side always keeps them.
 //!
 //! Overrides above 100 % are capped at the duration that keeps the limits; below, and in holds,
 //! everything only gets slower.
+//!
+//! # Hops
+//! A pick-and-place move is slowed down as a whole, by [`Limits::hop_slowdown`].
 
 mod config;
 mod course;
 mod feed;
+mod hop;
 mod joint_move;
 mod run;
 
 pub use config::{Bound, Limited, LimitsConfig, MotionLimits, Order, Part};
 pub use course::{Course, Region};
 pub use feed::{Limits, add_boxes};
+pub use hop::HopSlowdown;
 pub use run::{Choice, Run};
