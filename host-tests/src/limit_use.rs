@@ -2,10 +2,12 @@
 //! and which feeds they lower.
 
 use planner_core::config::{Robot, RobotConfig};
+use planner_core::kinematics::ArmKind;
 use planner_core::limits::{Bound, Limited, MotionLimits, Order, Part};
+use planner_core::pose::JointUnit;
 use serde::Serialize;
 
-use crate::checker::limits::{Arm, JointRow, Rates, rates};
+use crate::checker::limits::{Arm, Geometry, JointRow, Rates, rates};
 use crate::trace::{Trace, joints};
 
 /// One limit and what became of it.
@@ -25,13 +27,29 @@ pub struct LimitUse {
     pub lowest_feed_mm_s: Option<f64>,
 }
 
+/// Whether a limit of a kind of robot is one of lengths.
+fn is_length(kind: ArmKind, bound: Bound) -> bool {
+    match bound.part {
+        Part::Joint(joint) => {
+            kind.joint_units().get(usize::from(joint) - 1) == Some(&JointUnit::Length)
+        }
+        Part::Path | Part::Axis => true,
+    }
+}
+
 /// The value in a row that a limit is for: in ° or mm, per s, s² or s³.
 #[must_use]
-pub fn value(rates: &Rates, bound: Bound) -> f64 {
+pub fn value(kind: ArmKind, rates: &Rates, bound: Bound) -> f64 {
     let place = bound.order as usize;
     match bound.part {
-        Part::Joint(3) => rates.joints[2][place],
-        Part::Joint(joint) => rates.joints[usize::from(joint) - 1][place].to_degrees(),
+        Part::Joint(joint) => {
+            let value = rates.joints[usize::from(joint) - 1][place];
+            if is_length(kind, bound) {
+                value
+            } else {
+                value.to_degrees()
+            }
+        }
         Part::Path => rates.path[place],
         Part::Axis => rates.axis[place],
     }
@@ -39,9 +57,8 @@ pub fn value(rates: &Rates, bound: Bound) -> f64 {
 
 /// The unit of a limit.
 #[must_use]
-pub fn unit(bound: Bound) -> &'static str {
-    let is_length = matches!(bound.part, Part::Joint(3) | Part::Path | Part::Axis);
-    match (is_length, bound.order) {
+pub fn unit(kind: ArmKind, bound: Bound) -> &'static str {
+    match (is_length(kind, bound), bound.order) {
         (true, Order::Velocity) => "mm/s",
         (true, Order::Acceleration) => "mm/s²",
         (true, Order::Jerk) => "mm/s³",
@@ -79,10 +96,10 @@ pub fn trace_rates(robot: &Robot, trace: &Trace) -> Vec<Rates> {
         })
         .collect();
     let arm = Arm {
-        link1_mm: robot.config.scara.link1_mm.into(),
-        link2_mm: robot.config.scara.link2_mm.into(),
+        geometry: Geometry::of(&robot.config),
         step_s: Trace::time_s(1),
         longest_arc_mm: 0.0,
+        longest_hop_mm: 0.0,
     };
     rates(&rows, &arm)
 }
@@ -95,16 +112,17 @@ pub fn limit_uses(robot: &Robot, trace: &Trace, limited: &[Limited]) -> Vec<Limi
         return Vec::new();
     }
     let rates = trace_rates(robot, trace);
+    let kind = robot.arm.kind();
     let used = |(bound, allowed): (Bound, f64)| {
         let lowered = limited.iter().filter(|one| one.bound == bound);
         let feeds = lowered.clone().filter(|one| one.length_mm > 0.0);
         LimitUse {
             limit: bound.to_string(),
-            unit: unit(bound),
+            unit: unit(kind, bound),
             allowed,
             largest: rates
                 .iter()
-                .map(|row| value(row, bound))
+                .map(|row| value(kind, row, bound))
                 .fold(0.0, f64::max),
             lowered_segments: lowered.count(),
             lowest_feed_mm_s: feeds

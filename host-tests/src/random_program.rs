@@ -1,13 +1,10 @@
-//! Seeded random programs within the default robot's reach, for tests on both machines.
+//! Seeded random programs within the reach of the default SCARA or delta robot, for tests on both machines.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-/// X and Y of the region in which programs stay: convex, so that lines between its points do.
-const REGION_MM: [(f64, f64); 2] = [(150.0, 300.0), (-120.0, 120.0)];
 
 /// What a random program may contain.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +23,26 @@ pub struct Shape {
     pub tolerances: bool,
     /// Whether the program returns to its first point.
     pub closed: bool,
+    /// The first point.
+    pub start_mm: [f64; 3],
+    /// X and Y of the region in which the program stays: convex, so that lines between its points
+    /// do.
+    pub region_mm: [(f64, f64); 2],
+    /// How far Z goes from that of the first point, either way.
+    pub lift_mm: f64,
+}
+
+impl Shape {
+    /// Within the default delta robot's reach, over two thirds of its width.
+    #[must_use]
+    pub fn of_delta() -> Self {
+        Self {
+            start_mm: [0.0, 0.0, -720.0],
+            region_mm: [(-260.0, 260.0); 2],
+            lift_mm: 80.0,
+            ..Self::default()
+        }
+    }
 }
 
 impl Default for Shape {
@@ -38,6 +55,9 @@ impl Default for Shape {
             smooth: 0.3,
             tolerances: true,
             closed: false,
+            start_mm: [200.0, 0.0, 0.0],
+            region_mm: [(150.0, 300.0), (-120.0, 120.0)],
+            lift_mm: 20.0,
         }
     }
 }
@@ -46,8 +66,9 @@ impl Default for Shape {
 #[must_use]
 pub fn random_program(seed: u64, shape: Shape) -> String {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut text = String::from("G21 G90 G17\nG0 X200 Y0 Z0 C0\n");
-    let mut at = [200.0, 0.0];
+    let [x, y, z] = shape.start_mm;
+    let mut text = format!("G21 G90 G17\nG0 X{x} Y{y} Z{z} C0\n");
+    let mut at = [x, y];
     let mut heading = 0.0;
     for _ in 0..shape.moves {
         if shape.tolerances && rng.random_bool(0.1) {
@@ -60,11 +81,11 @@ pub fn random_program(seed: u64, shape: Shape) -> String {
         }
         let feed = 10.0_f64.powf(rng.random_range(2.7..4.5));
         let end = Move::random(&mut rng, shape, at, &mut heading);
-        let _ = writeln!(text, "{} F{feed:.0}", end.words(at, &mut rng));
+        let _ = writeln!(text, "{} F{feed:.0}", end.words(at, shape, &mut rng));
         at = end.target;
     }
     if shape.closed {
-        text.push_str("G1 X200 Y0 Z0 C0 F9600\n");
+        let _ = writeln!(text, "G1 X{x} Y{y} Z{z} C0 F9600");
     }
     text.push_str("M2\n");
     text
@@ -92,7 +113,7 @@ impl Move {
                 point.map(|value| (value * 1e4).round() / 1e4)
             };
             let candidate = if rng.random_bool(shape.arcs) {
-                Self::arc_around(rng, from, toward(direction, size_mm / 2.0))
+                Self::arc_around(rng, shape, from, toward(direction, size_mm / 2.0))
             } else {
                 Some(Self {
                     target: toward(direction, size_mm),
@@ -100,7 +121,7 @@ impl Move {
                 })
             };
             match candidate {
-                Some(found) if is_inside(found.target, 0.0) && found.target != from => {
+                Some(found) if is_inside(shape, found.target, 0.0) && found.target != from => {
                     *heading = direction;
                     return found;
                 }
@@ -111,7 +132,12 @@ impl Move {
     }
 
     /// An arc of a random sweep around a centre, if its circle stays in the region.
-    fn arc_around(rng: &mut impl Rng, from: [f64; 2], centre: [f64; 2]) -> Option<Self> {
+    fn arc_around(
+        rng: &mut impl Rng,
+        shape: Shape,
+        from: [f64; 2],
+        centre: [f64; 2],
+    ) -> Option<Self> {
         let (dx, dy) = (from[0] - centre[0], from[1] - centre[1]);
         let radius_mm = dx.hypot(dy);
         let counter_clockwise = rng.random_bool(0.5);
@@ -121,13 +147,13 @@ impl Move {
             centre[0] + dx * cos - dy * sin,
             centre[1] + dx * sin + dy * cos,
         ];
-        (radius_mm > 0.01 && is_inside(centre, radius_mm)).then(|| Self {
+        (radius_mm > 0.01 && is_inside(shape, centre, radius_mm)).then(|| Self {
             target: target.map(|value| (value * 1e4).round() / 1e4),
             arc: Some((centre, counter_clockwise)),
         })
     }
 
-    fn words(&self, from: [f64; 2], rng: &mut impl Rng) -> String {
+    fn words(&self, from: [f64; 2], shape: Shape, rng: &mut impl Rng) -> String {
         let [x, y] = self.target;
         let mut words = match self.arc {
             None => format!("G1 X{x:.4} Y{y:.4}"),
@@ -139,7 +165,8 @@ impl Move {
             ),
         };
         if rng.random_bool(0.2) {
-            let _ = write!(words, " Z{:.3}", rng.random_range(-20.0..20.0));
+            let lift_mm = rng.random_range(-shape.lift_mm..shape.lift_mm);
+            let _ = write!(words, " Z{:.3}", shape.start_mm[2] + lift_mm);
         }
         if rng.random_bool(0.2) {
             let _ = write!(words, " C{:.3}", rng.random_range(-90.0..90.0));
@@ -148,9 +175,9 @@ impl Move {
     }
 }
 
-fn is_inside(point: [f64; 2], margin: f64) -> bool {
+fn is_inside(shape: Shape, point: [f64; 2], margin: f64) -> bool {
     point
         .into_iter()
-        .zip(REGION_MM)
+        .zip(shape.region_mm)
         .all(|(value, (low, high))| (low + margin..=high - margin).contains(&value))
 }

@@ -179,7 +179,6 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
             FollowError::Shortest(_) => vec!["prefilter.residual_limit", "prefilter.uncertainty"],
         },
         ConfigError::Hop(error) => match error {
-            HopError::Limited => vec!["limits"],
             HopError::Rise { .. } => vec!["hop.rise_mm", "hop.height_mm"],
             HopError::Range { name, .. } => match *name {
                 "hop-height" => vec!["hop.height_mm"],
@@ -188,7 +187,6 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
                 _ => vec!["hop.acceleration_mm_s2"],
             },
         },
-        ConfigError::LimitsOnDelta => vec!["limits"],
         ConfigError::LimitsOnMap => vec!["map", "limits"],
         ConfigError::Range { name, .. } => match *name {
             "tolerance" => vec!["motion.corner_tolerance_mm"],

@@ -275,7 +275,7 @@ fn a_hop_is_held_gently_on_unfiltered_axes() {
             let [a, b, c] = [three[0].pose, three[1].pose, three[2].pose];
             for axis in 0..3 {
                 let bend_mm_s2 = (c[axis] - 2.0 * b[axis] + a[axis]).abs() * 1e6;
-                // its own acceleration, and the speed given up in a tenth of a second
+                // its own acceleration, and the speed given up in 150 ms, at 3/2 of the mean
                 let bound = acceleration + 10.0 * speed + 20.0;
                 assert!(bend_mm_s2 < bound, "held at {at}: {bend_mm_s2} mm/s²");
             }
@@ -283,7 +283,7 @@ fn a_hop_is_held_gently_on_unfiltered_axes() {
             longest_stand = longest_stand.max(stand);
         }
         assert!(
-            longest_stand > 250,
+            longest_stand > 200,
             "held at {at}: stood for {longest_stand} ms"
         );
         assert_eq!(rows[rows.len() - 1].pose[..3], [350.0, 0.0, -767.0]);

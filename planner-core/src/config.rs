@@ -93,8 +93,6 @@ pub enum ConfigError {
     Follow(FollowError),
     /// Pick-and-place moves.
     Hop(HopError),
-    /// Limits of motion of a delta robot: they need bounds on its joints that are not there.
-    LimitsOnDelta,
     /// Limits of acceleration or jerk beside a map of the mode: where the prefilter changes on
     /// the way of a move, they are not kept.
     LimitsOnMap,
@@ -143,9 +141,6 @@ impl fmt::Display for ConfigError {
             Self::Prefilter(error) => error.fmt(f),
             Self::Follow(error) => error.fmt(f),
             Self::Hop(error) => error.fmt(f),
-            Self::LimitsOnDelta => f.write_str(
-                "limits of motion are not kept by a delta robot yet: leave them out",
-            ),
             Self::LimitsOnMap => f.write_str(
                 "limits of acceleration and jerk are not kept while the prefilter follows a map of the mode or is chosen automatically: leave out either",
             ),
@@ -410,9 +405,6 @@ fn check_ranges(config: &RobotConfig) -> Result<(), ConfigError> {
 
 fn check_limits(config: &RobotConfig) -> Result<(), ConfigError> {
     let limits = &config.limits;
-    if config.arm == ArmKind::Delta && *limits != LimitsConfig::default() {
-        return Err(ConfigError::LimitsOnDelta);
-    }
     if (config.map.is_some() || config.automatic) && limits.boxes_needed() > 0 {
         return Err(ConfigError::LimitsOnMap);
     }
@@ -541,8 +533,8 @@ impl RobotConfig {
     }
 
     /// Names of all settings, in groups whose values must fit each other: lengths in mm, angles
-    /// in °, the frequency in Hz, feedrates in mm/s, the yaw limit in °/s, limits of joints 1, 2 and 4
-    /// in °, the others in mm.
+    /// in °, the frequency in Hz, feedrates in mm/s, the yaw limit in °/s, limits of joints
+    /// that turn in °, the others in mm.
     pub const GROUPS: [&'static [&'static str]; 28] = [
         &[
             "robot",
@@ -912,8 +904,7 @@ mod tests {
             Robot::new(&config).err()
         };
         assert_eq!(refused(|_| {}), None);
-        let on_delta = refused(|config| config.arm = ArmKind::Delta);
-        assert_eq!(on_delta, Some(ConfigError::LimitsOnDelta));
+        assert_eq!(refused(|config| config.arm = ArmKind::Delta), None);
         let on_map =
             refused(|config| config.map = ModeMapConfig::constant(MapNode::new(9.0, 0.02)));
         assert_eq!(on_map, Some(ConfigError::LimitsOnMap));

@@ -12,7 +12,7 @@ use crate::hop::{self, Hop, HopConfig, HopError, HopLimits};
 use crate::kinematics::{Arm, Elbow, PoseError, SegmentError};
 use crate::limits::{Course, Limited};
 use crate::path::{PathSegment, Shape};
-use crate::pose::{JointPosition, Pose};
+use crate::pose::{JointPosition, JointUnit, Pose};
 use crate::posture::{MoveToFollow, MoveTunings, Tuning};
 use crate::prefilter::{Kernel, Prefilter, PrefilterConfig};
 use crate::queue::{KERNELS_A_MOVE, SegmentProducer};
@@ -339,10 +339,14 @@ impl<'q> Planner<'q> {
             return asked_s;
         }
         let mut ways = [0.0; 4];
-        let units = [f64::from(AngleRad::DELTA), f64::from(LengthMm::DELTA)];
         let bits = from.to_bits().into_iter().zip(to.to_bits());
-        for ((way, (from, to)), unit) in ways.iter_mut().zip(bits).zip([0, 0, 1, 0]) {
-            *way = (f64::from(to.abs_diff(from)) * units[unit]) as f32;
+        let units = self.robot.arm.kind().joint_units();
+        for ((way, (from, to)), unit) in ways.iter_mut().zip(bits).zip(units) {
+            let unit = match unit {
+                JointUnit::Angle => f64::from(AngleRad::DELTA),
+                JointUnit::Length => f64::from(LengthMm::DELTA),
+            };
+            *way = (f64::from(to.abs_diff(from)) * unit) as f32;
         }
         let asked = asked_s.max(TICK_S) as f32;
         let (least_s, _) = self.robot.limits.joint_move_s(ways, asked);
@@ -431,7 +435,9 @@ impl<'q> Planner<'q> {
             queued |= self.stand_still(f64::from(duration_s));
         }
         if let Some(order) = hop {
-            queued |= self.plan_hop(order)?;
+            let (planned, slowed) = self.plan_hop(order)?;
+            queued |= planned;
+            limited = slowed;
         }
         for (order, timing) in command.moves().zip(&timings) {
             queued |= timing.duration_s > 0.0 && self.plan_move(order, timing);
@@ -459,9 +465,9 @@ impl<'q> Planner<'q> {
 
     /// Queues a pick-and-place move, with the prefilter that is in force.
     #[inline(never)]
-    fn plan_hop(&mut self, order: &HopMove) -> Result<bool, Cause> {
-        let hop = self.checked_hop(&self.robot.arm, order)?;
-        Ok(self.schedule.hop(&hop, order.line))
+    fn plan_hop(&mut self, order: &HopMove) -> Result<(bool, Option<Limited>), Cause> {
+        let (hop, limited) = self.checked_hop(&self.robot.arm, order)?;
+        Ok((self.schedule.hop(&hop, order.line), limited))
     }
 
     /// Queues a move, a short arc of a chain by chords.
@@ -663,10 +669,7 @@ impl<'q> Planner<'q> {
     /// A pick-and-place move that the arm can drive: up, across at the top and at the end of the
     /// vertical parts, and down. Not inlined, as [`Planner::elbow_move`].
     #[inline(never)]
-    fn checked_hop(&self, arm: &Arm, order: &HopMove) -> Result<Hop, Cause> {
-        if self.robot.limits.is_set() {
-            return Err(Cause::Hop(HopError::Limited));
-        }
+    fn checked_hop(&self, arm: &Arm, order: &HopMove) -> Result<(Hop, Option<Limited>), Cause> {
         let own = self.robot.config.hop;
         let wanted = HopConfig {
             height_mm: order.height_mm.unwrap_or(own.height_mm),
@@ -675,7 +678,19 @@ impl<'q> Planner<'q> {
             acceleration_mm_s2: order.acceleration_mm_s2.unwrap_or(own.acceleration_mm_s2),
             axes: own.axes,
         };
-        let hop = self.hop_of(order, &wanted).map_err(Cause::Hop)?;
+        wanted.check().map_err(Cause::Hop)?;
+        let mut limits = HopLimits {
+            feed_mm_s: self.robot.config.feed_limit_mm_s,
+            yaw_deg_s: self.robot.config.yaw_limit_deg_s,
+            slowdown: None,
+        };
+        let limited = self.slow_hop(order, &wanted, &mut limits);
+        let peaks = hop::peaks(&order.start, &order.target, &wanted, &limits);
+        let duration_s = peaks.apart_s;
+        if duration_s > LONGEST_S {
+            return Err(Cause::TooSlow { duration_s });
+        }
+        let hop = self.hop_of(order, &wanted, &limits).map_err(Cause::Hop)?;
         for [start, target] in hop.outline(wanted.height_mm) {
             let line = PathSegment {
                 start,
@@ -684,20 +699,51 @@ impl<'q> Planner<'q> {
             };
             arm.check_segment(&line).map_err(Cause::Segment)?;
         }
-        Ok(hop)
+        Ok((hop, limited))
+    }
+
+    /// Slows a pick-and-place move down for the limits of motion, and says for which.
+    #[inline(never)]
+    fn slow_hop(
+        &self,
+        order: &HopMove,
+        wanted: &HopConfig,
+        limits: &mut HopLimits,
+    ) -> Option<Limited> {
+        if !self.robot.limits.is_set() {
+            return None;
+        }
+        let slowed = |slowdown: f64| HopLimits {
+            slowdown: Some(slowdown),
+            ..*limits
+        };
+        let [start, target] = [&order.start, &order.target];
+        let peaks = |slowdown| hop::peaks(start, target, wanted, &slowed(slowdown));
+        let rise = LengthMm::saturating_from_num(wanted.rise_mm);
+        let top = start.z.max(target.z).saturating_add(rise);
+        let found = self.robot.limits.hop_slowdown([start, target], top, peaks);
+        let (asked, takes) = (peaks(1.0), peaks(found.slowdown));
+        let limited = found.bound.map(|bound| Limited {
+            bound,
+            asked_s: asked.apart_s,
+            takes_s: takes.apart_s,
+            length_mm: takes.length_mm,
+        });
+        *limits = slowed(found.slowdown);
+        limited
     }
 
     /// A pick-and-place move with the prefilter that is in force. Not inlined, so that the
     /// prefilter is on the stack for a moment only.
     #[inline(never)]
-    fn hop_of(&self, order: &HopMove, wanted: &HopConfig) -> Result<Hop, HopError> {
-        let config = &self.robot.config;
-        let limits = HopLimits {
-            feed_mm_s: config.feed_limit_mm_s,
-            yaw_deg_s: config.yaw_limit_deg_s,
-        };
+    fn hop_of(
+        &self,
+        order: &HopMove,
+        wanted: &HopConfig,
+        limits: &HopLimits,
+    ) -> Result<Hop, HopError> {
         let prefilter = self.robot.prefilter();
-        hop::plan(order.start, order.target, wanted, &limits, &prefilter)
+        hop::plan(order.start, order.target, wanted, limits, &prefilter)
     }
 
     /// How long a motion takes; zero if it is shorter than anything.
@@ -723,7 +769,7 @@ impl<'q> Planner<'q> {
         // what the highest override could make of it
         let hurried_s = (0.5 * timing.duration_s).max(timing.shortest_s);
         let asked_s = hurried_s.max(TICK_S) as f32;
-        let course = Course::new(path);
+        let course = Course::new(path, self.robot.limits.kind());
         (timing.least_s, timing.bound) = self.robot.limits.least_s(&course, asked_s);
     }
 

@@ -25,11 +25,9 @@ impl Rate {
         Self(scaled / 100).min(Self::FASTEST)
     }
 
-    /// This rate, changed towards another one by no more than a hundredth of [`Rate::ONE`].
-    pub fn towards(self, wanted: Self) -> Self {
-        const STEP: u32 = Rate::ONE.0 / 100;
-        let (low, high) = (self.0.saturating_sub(STEP), self.0.saturating_add(STEP));
-        Self(wanted.0.clamp(low, high))
+    /// The rate at which so much raw time passes in a tick, rounded down.
+    fn of_tick(raw: TickTime) -> Self {
+        Self((raw >> (32 - RATE_BITS)) as u32)
     }
 
     /// A ratio, rounded down, within [`Rate::ONE`] and [`Rate::FASTEST`].
@@ -60,6 +58,53 @@ impl Rate {
     }
 }
 
+/// A whole change of a [`GradualRate`], in 2^-31.
+const CHANGED: u32 = 1 << 31;
+
+/// A rate that changes without a jump of itself or its slope, for what nothing smooths.
+///
+/// From one rate to another one in N ticks, as a part `S(x) = x² (3 − 2x)` of the difference: the
+/// slope is at most `3/2 / N` of it, the change of the slope within a tick `6 / N²`. What is
+/// wanted anew meanwhile waits until then.
+#[derive(Clone, Copy, Debug)]
+pub struct GradualRate {
+    from: Rate,
+    to: Rate,
+    /// How much of the change is over, in 2^-31.
+    changed: u32,
+}
+
+impl GradualRate {
+    /// How much of a change that takes so many ticks passes in each, for
+    /// [`GradualRate::next_tick`].
+    pub fn step(ticks: u32) -> u32 {
+        CHANGED.div_ceil(ticks.max(1))
+    }
+
+    /// A rate that is steady so far.
+    pub fn steady(rate: Rate) -> Self {
+        Self {
+            from: rate,
+            to: rate,
+            changed: CHANGED,
+        }
+    }
+
+    /// The raw time of the next tick, on the way to the rate that is wanted, and the rate of it
+    /// rounded down.
+    pub fn next_tick(&mut self, wanted: Rate, step: u32) -> (TickTime, Rate) {
+        if self.changed >= CHANGED && wanted != self.to {
+            (self.from, self.to, self.changed) = (self.to, wanted, 0);
+        }
+        self.changed = self.changed.saturating_add(step).min(CHANGED);
+        let x = u64::from(self.changed);
+        let part = (((x * x) >> 31) * ((3 << 31) - 2 * x)) >> 31;
+        let [from, to] = [self.from.0, self.to.0].map(i64::from);
+        let raw = (from << 16) + (((to - from) * part as i64) >> (31 - 16));
+        (raw, Rate::of_tick(raw))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -80,6 +125,32 @@ mod tests {
         }
         assert_eq!(Rate::ZERO.raw(ONE_TICK), 0);
         assert_eq!(Rate::ZERO.real(ONE_TICK), 0);
+    }
+
+    #[test]
+    fn a_gradual_change_is_smooth_and_complete() {
+        let mut rate = GradualRate::steady(Rate::ONE);
+        let step = GradualRate::step(200);
+        assert_eq!(rate.next_tick(Rate::ONE, step), (ONE_TICK, Rate::ONE));
+        let (mut before, mut slope) = (ONE_TICK, 0);
+        let one = ONE_TICK as f64;
+        let mut steepest = 0.0_f64;
+        for tick in 0..200 {
+            // what is wanted on the way waits
+            let wanted = if tick == 70 { Rate::ONE } else { Rate::ZERO };
+            let (raw, _) = rate.next_tick(wanted, step);
+            let now = raw - before;
+            let bend = (now - slope) as f64 / one * 200.0 * 200.0;
+            assert!(now <= 0 && bend.abs() < 6.01, "{tick}: {bend}");
+            steepest = steepest.max(-(now as f64) / one * 200.0);
+            (before, slope) = (raw, now);
+        }
+        assert!((1.49..1.5).contains(&steepest), "{steepest}");
+        assert_eq!(rate.next_tick(Rate::ZERO, step), (0, Rate::ZERO));
+        for _ in 0..200 {
+            rate.next_tick(Rate::ONE, step);
+        }
+        assert_eq!(rate.next_tick(Rate::ONE, step), (ONE_TICK, Rate::ONE));
     }
 
     #[test]

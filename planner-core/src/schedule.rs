@@ -158,7 +158,7 @@ impl<'q> Schedule<'q> {
         }
         let limits = &robot.limits;
         let limited = limits.is_set().then(|| {
-            let course = Course::new(path);
+            let course = Course::new(path, limits.kind());
             let asked_s = timing.duration_s as f32;
             let choice = self.run.choose(limits, &course, asked_s, timing.least_s);
             (course, choice)
@@ -166,8 +166,7 @@ impl<'q> Schedule<'q> {
         let (mut rule, mut timing) = (rule, *timing);
         let mut stop = 0;
         if let Some((course, choice)) = &limited {
-            let innermost_mm = self.run.innermost_mm(course);
-            rule = limits.rule(rule, innermost_mm);
+            rule = limits.rule(rule, self.run.spare_mm(limits, course));
             let asked_s = timing.duration_s;
             timing.keep(choice);
             stop = tick_time(f64::from(choice.dwell_s));

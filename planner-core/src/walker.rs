@@ -3,7 +3,7 @@
 use crate::pose::AXES;
 use crate::prefilter::Kernel;
 use crate::queue::{Action, RawItem, SegmentConsumer};
-use crate::rate::Rate;
+use crate::rate::{GradualRate, Rate};
 use crate::raw::{Bow, ONE_TICK, Pace, RawSegment, TickTime, WHOLE};
 
 /// What the raw path did in a tick.
@@ -100,7 +100,7 @@ impl Stand {
             since_corner: self.time.wrapping_add(wait),
             licence,
             pace: Rate::ZERO,
-            hop_rate: wanted.min(Rate::ONE),
+            hop_rate: GradualRate::steady(wanted.min(Rate::ONE)),
         };
         way.advance(next, wanted.min(licence).raw(left - wait), left - wait);
         Some(way)
@@ -137,8 +137,9 @@ struct Way {
     licence: Rate,
     /// The rate of the last tick; zero if only a part of it was moved in.
     pace: Rate,
-    /// The rate of the moment along a hop.
-    hop_rate: Rate,
+    /// The rate along a hop, never above the planned one. It changes gradually, because nothing
+    /// smooths the axes that the prefilter does not act on.
+    hop_rate: GradualRate,
 }
 
 impl Way {
@@ -162,13 +163,6 @@ impl Way {
             self.licence = wanted.min(segment.top_rate);
         }
         wanted.min(self.licence)
-    }
-
-    /// The rate of the moment along a hop, never above the planned one. It changes gradually,
-    /// because nothing smooths the axes that the prefilter does not act on.
-    fn along_hop(&mut self, wanted: Rate) -> Rate {
-        self.hop_rate = self.hop_rate.towards(wanted.min(Rate::ONE));
-        self.hop_rate
     }
 
     /// Goes on for `share` of raw time, which takes `time`.
@@ -430,17 +424,19 @@ impl<'q> Walker<'q> {
                 left: 0,
             };
         }
-        let rate = if segment.is_hop {
-            way.along_hop(if self.held {
+        let (share, rate) = if segment.is_hop {
+            let wanted = if self.held {
                 Rate::ZERO
             } else {
-                self.rates.of(segment)
-            })
+                self.rates.of(segment).min(Rate::ONE)
+            };
+            let step = self.queue.hop().map_or(u32::MAX, |hop| hop.rate_step);
+            way.hop_rate.next_tick(wanted, step)
         } else {
-            way.rate(kernel, segment, self.rates.of(segment))
+            let rate = way.rate(kernel, segment, self.rates.of(segment));
+            (rate.raw(ONE_TICK), rate)
         };
-        let moved = segment.moves() && rate > Rate::ZERO;
-        let share = rate.raw(ONE_TICK);
+        let moved = segment.moves() && share > 0;
         if way.remaining > share {
             way.advance(segment, share, ONE_TICK);
             way.pace = rate;

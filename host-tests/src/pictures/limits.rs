@@ -34,6 +34,7 @@ pub fn draw(run: &PairedRun) -> Result<Option<String>> {
     }
     let trace = &run.outcome.trace;
     let rows = trace_rates(&robot, trace);
+    let kind = run.robot.arm;
     let rows = rows
         .get(..(trace.stop() + 50).min(rows.len()))
         .unwrap_or(&[]);
@@ -57,12 +58,12 @@ pub fn draw(run: &PairedRun) -> Result<Option<String>> {
             let allowed = found.map(|(_, allowed)| *allowed);
             let curve: Vec<Point> = (1..)
                 .zip(rows)
-                .map(|(row, rates)| (Trace::time_s(row), value(rates, bound)))
+                .map(|(row, rates)| (Trace::time_s(row), value(kind, rates, bound)))
                 .collect();
             let largest = curve.iter().map(|point| point.1).chain(allowed);
             let top = largest.fold(1e-3, f64::max) * 1.12;
             let area = caption(panel, &format!("{} {}", name(part), order_name(order)))?;
-            let y_name = unit(bound);
+            let y_name = unit(kind, bound);
             let mut chart = axes(&area, [(0.0, end), (0.0, top)], ["time, s", y_name], [6, 4])?;
             lines(&mut chart, [envelope(curve, POINTS)], COMMAND, 1)?;
             if let Some(allowed) = allowed {

@@ -163,6 +163,36 @@ impl DeltaArm {
         std::array::from_fn(|axis| (0..3).map(|k| columns[k][axis] * r[k]).sum::<f64>() * 1e-3)
     }
 
+    /// Velocity and acceleration of the platform in mm/s and mm/s², at rates and accelerations of
+    /// the arms.
+    #[must_use]
+    pub fn platform_motion(
+        &self,
+        q: [f64; 4],
+        rates: Vector,
+        accelerations: Vector,
+    ) -> [Vector; 2] {
+        let posture = self.posture(q);
+        let bias = self.bias(&posture, rates);
+        let driven = |by: Vector| {
+            let columns = &posture.columns;
+            std::array::from_fn(|axis| (0..3).map(|k| columns[k][axis] * by[k]).sum::<f64>())
+        };
+        let [velocity, acceleration]: [Vector; 2] = [driven(rates), driven(accelerations)];
+        let total = std::array::from_fn(|axis| acceleration[axis] + bias[axis]);
+        [velocity, total]
+    }
+
+    /// How far each arm turns at the most for each mm of the platform, in rad/mm.
+    #[must_use]
+    pub fn turns_per_mm(&self, q: [f64; 4]) -> Vector {
+        let posture = self.posture(q);
+        std::array::from_fn(|k| {
+            let root = dot(posture.forearms[k], posture.limbs[k].tangent);
+            self.forearm_mm / (self.upper_arm_mm * root.abs())
+        })
+    }
+
     /// Kinetic energy in joules.
     #[must_use]
     pub fn kinetic_j(&self, q: [f64; 4], r: Vector) -> f64 {

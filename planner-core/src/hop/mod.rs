@@ -20,6 +20,12 @@
 //! the path of the tool stays vertical where it has to be. A tolerance as large as the move
 //! leaves the raw path's times, and what the prefilter makes of its shape.
 //!
+//! **Limits of motion.** Where they are set all three motions take so many times as long that the
+//! limits hold ([`HopLimits::slowdown`]): see [`crate::limits`].
+//!
+//! **Holds and overrides** change the rate at which the raw path is walked, gradually: without
+//! limits within 150 ms, with them in as many ticks as their accelerations and jerks need.
+//!
 //! [`tolerance`]: HopConfig::tolerance_mm
 
 mod filtered;
@@ -29,7 +35,7 @@ mod raw;
 
 use core::fmt;
 
-pub use plan::{Hop, HopLimits, plan};
+pub use plan::{Hop, HopLimits, HopPeaks, peaks, plan};
 pub use ramp::Ramp;
 pub use raw::RawHop;
 
@@ -109,8 +115,6 @@ pub enum HopError {
         /// Highest value.
         high: f32,
     },
-    /// Limits of motion are set, which a hop does not keep.
-    Limited,
     /// The vertical part is higher than the hop.
     Rise {
         /// Of the hop, in mm.
@@ -123,9 +127,6 @@ pub enum HopError {
 impl fmt::Display for HopError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Limited => f.write_str(
-                "limits of motion are set, which a hop does not keep: go up, across and down by G1 moves",
-            ),
             Self::Range {
                 name,
                 value,

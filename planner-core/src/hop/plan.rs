@@ -1,9 +1,11 @@
 //! When a hop goes up, across and down.
 
 use super::filtered::times_s;
+use super::ramp::HELD;
 use super::{HopAxes, HopConfig, HopError, Ramp, RawHop};
 use crate::pose::Pose;
 use crate::prefilter::Prefilter;
+use crate::rate::GradualRate;
 use crate::units::{LengthMm, TICK_HZ, TICK_S};
 
 /// Part of the tolerance that is planned with: the rest is for what the prefilter's integer taps
@@ -17,6 +19,97 @@ pub struct HopLimits {
     pub feed_mm_s: f32,
     /// Speed of the yaw.
     pub yaw_deg_s: f32,
+    /// How many times as long each motion takes, from 1 on, where limits of motion are set: it
+    /// keeps them also while it is held or its rate changes.
+    pub slowdown: Option<f64>,
+}
+
+/// Changes of the rate take so many ticks where no limits are set.
+const CHANGE_TICKS: u32 = 150;
+
+/// The largest speed, acceleration and jerk that a hop has, per s, s² and s³, holds included.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HopPeaks {
+    /// Of the tool in the plane, in mm.
+    pub across: [f32; 3],
+    /// Along Z, in mm.
+    pub vertical: [f32; 3],
+    /// Of the yaw, in rad.
+    pub yaw: [f32; 3],
+    /// What the resolution of axes that the prefilter does not act on may add to accelerations, in
+    /// mm/s² and °/s².
+    pub grain: f32,
+    /// How long its motions would take one after the other, in s.
+    pub apart_s: f64,
+    /// How long up, across and down are together, in mm.
+    pub length_mm: f64,
+}
+
+/// Lengths of a hop, with the motions over them.
+struct Motions {
+    top_mm: f64,
+    across_mm: f64,
+    up_mm: f64,
+    down_mm: f64,
+    turn_deg: f64,
+    acceleration: f64,
+    up: Ramp,
+    across: Ramp,
+    down: Ramp,
+}
+
+impl Motions {
+    fn new(start: &Pose, target: &Pose, config: &HopConfig, limits: &HopLimits) -> Self {
+        let mm = |pose: &Pose| [pose.x, pose.y, pose.z].map(|value| value.to_num::<f64>());
+        let ([x0, y0, z0], [x1, y1, z1]) = (mm(start), mm(target));
+        let across_mm = libm::hypot(x1 - x0, y1 - y0);
+        let turn_deg = libm::fabs(target.c.to_num::<f64>() - start.c.to_num::<f64>());
+        let top_mm = z0.max(z1) + f64::from(config.rise_mm);
+        let (up_mm, down_mm) = (top_mm - z0, top_mm - z1);
+        let slowdown = limits.slowdown.unwrap_or(1.0);
+        let speed = f64::from(limits.feed_mm_s) / slowdown;
+        let acceleration = f64::from(config.acceleration_mm_s2) / (slowdown * slowdown);
+        let ramp = |length_mm, slowest_s| Ramp::new(length_mm, speed, acceleration, slowest_s);
+        Self {
+            top_mm,
+            across_mm,
+            up_mm,
+            down_mm,
+            turn_deg,
+            acceleration,
+            up: ramp(up_mm, 0.0),
+            across: ramp(across_mm, slowdown * turn_deg / f64::from(limits.yaw_deg_s)),
+            down: ramp(down_mm, 0.0),
+        }
+    }
+}
+
+/// What a hop that is planned with these does at the most. Settings have been checked.
+#[must_use]
+#[inline(never)]
+pub fn peaks(start: &Pose, target: &Pose, config: &HopConfig, limits: &HopLimits) -> HopPeaks {
+    let motions = Motions::new(start, target, config, limits);
+    let held = |[speed, acceleration, jerk]: [f32; 3]| [speed, acceleration * HELD, jerk * HELD];
+    let [up, down] = [(motions.up, motions.up_mm), (motions.down, motions.down_mm)]
+        .map(|(ramp, mm)| held(ramp.peaks(mm as f32)));
+    let mut vertical = up;
+    for (peak, down) in vertical.iter_mut().zip(down) {
+        *peak = peak.max(down);
+    }
+    let all = [motions.up, motions.across, motions.down];
+    let ticks: f64 = all.iter().map(|ramp| f64::from(ramp.ticks())).sum();
+    HopPeaks {
+        across: held(motions.across.peaks(motions.across_mm as f32)),
+        vertical,
+        yaw: held(motions.across.peaks(motions.turn_deg.to_radians() as f32)),
+        grain: if config.axes == HopAxes::All {
+            0.0
+        } else {
+            grain(motions.across_mm.max(motions.up_mm).max(motions.down_mm))
+        },
+        apart_s: ticks * TICK_S,
+        length_mm: motions.up_mm + motions.across_mm + motions.down_mm,
+    }
 }
 
 /// A planned hop.
@@ -51,6 +144,14 @@ impl Hop {
     }
 }
 
+/// What rounding adds to the acceleration of a raw path: a second difference of three points that
+/// are rounded to 2^-19 mm, of progresses that are good to 2^-30, in each of three axes.
+fn grain(length_mm: f64) -> f32 {
+    const PER_S2: f64 = 1.0 / (TICK_S * TICK_S);
+    let axis_mm = 2.0 / f64::from(1 << 19) + length_mm * 4.0 / f64::from(1 << 30);
+    (1.732_051 * axis_mm * PER_S2) as f32
+}
+
 /// Plans a hop.
 ///
 /// With `t↑(h)` when *up* has passed the height, `t↓(h)` when *down* comes to it, counted from
@@ -78,19 +179,17 @@ pub fn plan(
     prefilter: &Prefilter,
 ) -> Result<Hop, HopError> {
     config.check()?;
-    let mm = |pose: &Pose| [pose.x, pose.y, pose.z].map(|value| value.to_num::<f64>());
-    let ([x0, y0, z0], [x1, y1, z1]) = (mm(&start), mm(&target));
-    let across_mm = libm::hypot(x1 - x0, y1 - y0);
-    let turn_deg = libm::fabs(target.c.to_num::<f64>() - start.c.to_num::<f64>());
-    let top_mm = z0.max(z1) + f64::from(config.rise_mm);
-    let (up_mm, down_mm) = (top_mm - z0, top_mm - z1);
-    let (speed, acceleration) = (
-        f64::from(limits.feed_mm_s),
-        f64::from(config.acceleration_mm_s2),
-    );
-    let ramp = |length_mm, slowest_s| Ramp::new(length_mm, speed, acceleration, slowest_s);
-    let (up, down) = (ramp(up_mm, 0.0), ramp(down_mm, 0.0));
-    let across = ramp(across_mm, turn_deg / f64::from(limits.yaw_deg_s));
+    let Motions {
+        top_mm,
+        across_mm,
+        up_mm,
+        down_mm,
+        acceleration,
+        up,
+        across,
+        down,
+        ..
+    } = Motions::new(&start, &target, config, limits);
 
     let over_all = (config.axes == HopAxes::All).then_some(prefilter);
     let over_across = (config.axes != HopAxes::None).then_some(prefilter);
@@ -116,6 +215,12 @@ pub fn plan(
     let after_s = (raw_last_s - raw_down_s).max(last_s - down_s);
     let down_begins = ticks((f64::from(across_begins) * TICK_S + after_s).max(top_s));
 
+    let change_ticks = match limits.slowdown {
+        Some(_) => [up, across, down]
+            .iter()
+            .fold(CHANGE_TICKS, |most, ramp| most.max(ramp.change_ticks())),
+        None => CHANGE_TICKS,
+    };
     let bits = |mm: f64| libm::round(mm * f64::from(1 << 19)) as i32;
     let up_bits = bits(up_mm);
     let is_direct =
@@ -134,6 +239,7 @@ pub fn plan(
             down_begins,
             down,
             direct: is_direct,
+            rate_step: GradualRate::step(change_ticks),
         },
     })
 }

@@ -10,6 +10,10 @@ use crate::units::{TICK_HZ, TICK_S};
 /// come out: `T √A = 2.526 √m` over 0.7 m with 50 mm vertical at either end.
 const EASE: f64 = 0.2;
 
+/// By how much a change of the rate adds to the accelerations and jerks of a ramp, where it takes
+/// as long as [`Ramp::change_ticks`] says.
+pub(crate) const HELD: f32 = 1.1;
+
 /// Bits of a progress after the point.
 pub(super) const PROGRESS_BITS: u32 = 31;
 
@@ -19,6 +23,9 @@ pub(super) const DONE: u64 = 1 << PROGRESS_BITS;
 /// Bits after the point of a reciprocal of ticks, and of a time in ticks that goes with it.
 const INVERSE_BITS: u32 = 42;
 const TIME_BITS: u32 = 20;
+
+/// Longest time in ticks (6 days): sums of some of them do not overflow.
+const TICKS_MAX: f64 = (1 << 29) as f64;
 
 /// `DONE / 6`.
 const SIXTH: u64 = (DONE + 3) / 6;
@@ -54,7 +61,8 @@ impl Ramp {
         // L = A T₁ (T₁ + T₂)
         let unlimited_s = libm::sqrt(length / (acceleration * (1.0 + EASE)));
         let rise_s = unlimited_s.min(speed / acceleration);
-        let ticks = |time_s: f64| libm::ceil(time_s * f64::from(TICK_HZ)).max(1.0) as u32;
+        let ticks =
+            |time_s: f64| libm::ceil(time_s * f64::from(TICK_HZ)).clamp(1.0, TICKS_MAX) as u32;
         let rise = ticks(rise_s);
         let ease = ticks(rise_s * EASE);
         let cruise = ticks((length / speed).max(slowest_s)).max(rise + ease);
@@ -79,6 +87,24 @@ impl Ramp {
     #[must_use]
     pub fn boxes_s(&self) -> [f64; 3] {
         [self.cruise, self.rise, self.ease].map(|ticks| f64::from(ticks) * TICK_S)
+    }
+
+    /// Its largest speed, acceleration and jerk over a length, per s, s² and s³.
+    #[must_use]
+    pub fn peaks(&self, length: f32) -> [f32; 3] {
+        let [cruise, rise, ease] =
+            [self.cruise, self.rise, self.ease].map(|ticks| TICK_HZ as f32 / ticks as f32);
+        let speed = length * cruise;
+        [speed, speed * rise, speed * rise * ease]
+    }
+
+    /// In how many ticks the rate of passing through it may change, so that with the terms
+    /// `v ρ'` and `3 A ρ ρ' + v ρ''` acceleration and jerk come to at most [`HELD`] times those of
+    /// the ramp: `ρ² + ρ'/4 ≤ 1.09` and `ρ³ + 0.15 ρρ' + |ρ''|/80 ≤ 1.09` where N is four times
+    /// `T_1` and twenty times `T_2`.
+    #[must_use]
+    pub(super) fn change_ticks(&self) -> u32 {
+        (4 * self.rise).max(20 * self.ease)
     }
 
     /// How far it has come at a time since its begin, from 0 to [`DONE`].

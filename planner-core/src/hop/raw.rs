@@ -23,6 +23,8 @@ pub struct RawHop {
     pub down: Ramp,
     /// Axes that the prefilter does not act on.
     pub direct: [bool; AXES],
+    /// How much of a change of its rate passes in a tick: [`crate::rate::GradualRate::step`].
+    pub rate_step: u32,
 }
 
 /// The axis that goes up and down.

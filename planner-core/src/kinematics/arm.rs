@@ -2,6 +2,7 @@
 
 use super::config::Elbow;
 use super::delta::Delta;
+use super::delta_bounds::DeltaBounds;
 use super::pose_check::PoseError;
 use super::rate_bounds::RingBounds;
 use super::scara::Scara;
@@ -43,6 +44,26 @@ pub enum Arm {
     Scara(Scara),
     /// A delta robot.
     Delta(Delta),
+}
+
+/// The shape of an arm, for bounds on what its joints do.
+#[derive(Clone, Copy, Debug)]
+pub enum ArmBounds {
+    /// Of a SCARA, which looks the same from every side: they depend on the radius.
+    Scara(RingBounds),
+    /// Of a delta robot, which does not.
+    Delta(DeltaBounds),
+}
+
+impl ArmBounds {
+    /// Which kind of robot it is.
+    #[must_use]
+    pub const fn kind(&self) -> ArmKind {
+        match self {
+            Self::Scara(_) => ArmKind::Scara,
+            Self::Delta(_) => ArmKind::Delta,
+        }
+    }
 }
 
 impl Arm {
@@ -119,13 +140,12 @@ impl Arm {
         }
     }
 
-    /// The shape of the arm, for bounds on what its joints do: [`Scara::ring_bounds`]. None of
-    /// a delta robot, which does not look the same from every side.
+    /// The shape of the arm, for bounds on what its joints do. Not for the tick.
     #[must_use]
-    pub fn ring_bounds(&self) -> Option<RingBounds> {
+    pub fn bounds(&self) -> ArmBounds {
         match self {
-            Self::Scara(scara) => Some(scara.ring_bounds()),
-            Self::Delta(_) => None,
+            Self::Scara(scara) => ArmBounds::Scara(scara.ring_bounds()),
+            Self::Delta(delta) => ArmBounds::Delta(delta.bounds()),
         }
     }
 

@@ -10,6 +10,7 @@
 mod arm;
 mod config;
 mod delta;
+mod delta_bounds;
 mod delta_check;
 mod delta_config;
 mod delta_forward;
@@ -18,9 +19,10 @@ mod rate_bounds;
 mod scara;
 mod segment_check;
 
-pub use arm::{Arm, ArmKind};
+pub use arm::{Arm, ArmBounds, ArmKind};
 pub use config::{Elbow, JointRange, ScaraConfig, ScaraError};
 pub use delta::Delta;
+pub use delta_bounds::{DeltaBounds, Sweep};
 pub use delta_config::{DeltaConfig, DeltaError};
 pub use pose_check::PoseError;
 pub use rate_bounds::{RateBounds, Ring, RingBounds};

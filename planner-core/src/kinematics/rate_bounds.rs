@@ -40,7 +40,7 @@ pub struct RateBounds {
 }
 
 impl RateBounds {
-    fn larger(self, other: Self) -> Self {
+    pub(super) fn larger(self, other: Self) -> Self {
         Self {
             first: self.first.max(other.first),
             second: self.second.max(other.second),

@@ -16,7 +16,7 @@ pub struct MotionLimits {
 /// All limits of motion; by default there are none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LimitsConfig {
-    /// Of each joint: in °, joint 3 in mm.
+    /// Of each joint: in °, joint 3 of a SCARA in mm.
     pub joints: [MotionLimits; 4],
     /// Of the tool along its path, in mm: tangential, after \[Li23\] Table 4.
     pub path: MotionLimits,
@@ -78,16 +78,17 @@ pub struct Bound {
     pub order: Order,
 }
 
-/// A segment whose feed a limit lowers.
+/// A segment whose feed a limit lowers, or a hop that it slows down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limited {
     /// The limit.
     pub bound: Bound,
-    /// How long the program gives it, in s.
+    /// How long the program gives it, in s; of a hop its motions one after the other, as
+    /// [`Limited::takes_s`] is then.
     pub asked_s: f64,
     /// How long it takes.
     pub takes_s: f64,
-    /// Its length in mm; 0 if it only turns.
+    /// Its length in mm, of a hop up, across and down; 0 if it only turns.
     pub length_mm: f64,
 }
 

@@ -1,14 +1,23 @@
 //! What the limits have to know of a segment.
 
-use crate::kinematics::{Curve, Ring};
+use crate::kinematics::{ArmKind, Curve, Ring, Sweep};
 use crate::math::sqrt_f32;
 use crate::path::{PathSegment, Shape};
+
+/// Where a segment is, as bounds on the joints of an arm need it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Region {
+    /// Seen from the shoulder of a SCARA.
+    Ring(Ring),
+    /// In the space of a delta robot.
+    Sweep(Sweep),
+}
 
 /// A segment as the limits see it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Course {
-    /// Where it is, seen from the shoulder.
-    pub ring: Ring,
+    /// Where it is.
+    pub region: Region,
     /// Its length in mm.
     pub length_mm: f32,
     /// Its length in the plane.
@@ -26,9 +35,9 @@ pub struct Course {
 }
 
 impl Course {
-    /// What the limits have to know of `path`.
+    /// What the limits of a kind of robot have to know of `path`.
     #[must_use]
-    pub fn new(path: &PathSegment) -> Self {
+    pub fn new(path: &PathSegment, kind: ArmKind) -> Self {
         let length_mm = path.length_mm() as f32;
         let (first_tangent, last_tangent, _) = path.tangents();
         let at = |u: f64| path.pose(u).map(|value| value as f32);
@@ -47,9 +56,17 @@ impl Course {
             Shape::Line => [(end[0] - start[0]).abs(), (end[1] - start[1]).abs(), z_mm],
             Shape::Arc(_) => [plane_mm, plane_mm, z_mm],
         };
-        let ring = match path.shape {
-            Shape::Line => ring_of_line([start[0], start[1]], [end[0], end[1]]),
-            Shape::Arc(arc) => {
+        let region = match (kind, path.shape) {
+            (ArmKind::Delta, _) => {
+                Region::Sweep(Sweep::new(length_mm, curvature_per_mm, 0.0, |u| {
+                    let [x, y, z, _] = at(u);
+                    [x, y, z]
+                }))
+            }
+            (ArmKind::Scara, Shape::Line) => {
+                Region::Ring(ring_of_line([start[0], start[1]], [end[0], end[1]]))
+            }
+            (ArmKind::Scara, Shape::Arc(arc)) => {
                 let centre_mm = root(arc.centre_x_mm as f32, arc.centre_y_mm as f32);
                 let radius_mm = arc.radius_mm.max(arc.end_radius_mm) as f32;
                 let middle_mm = root(middle[0], middle[1]);
@@ -57,14 +74,14 @@ impl Course {
                 let half_mm = 0.5 * plane_mm;
                 let smaller_mm = arc.radius_mm.min(arc.end_radius_mm) as f32;
                 let inner_mm = (centre_mm - radius_mm).max(smaller_mm - centre_mm);
-                Ring {
+                Region::Ring(Ring {
                     inner_mm: inner_mm.max(middle_mm - half_mm),
                     outer_mm: (centre_mm + radius_mm).min(middle_mm + half_mm),
-                }
+                })
             }
         };
         Self {
-            ring,
+            region,
             length_mm,
             plane_mm,
             axes_mm,
@@ -77,7 +94,7 @@ impl Course {
 }
 
 /// The radii along a straight line.
-fn ring_of_line(from: [f32; 2], to: [f32; 2]) -> Ring {
+pub(super) fn ring_of_line(from: [f32; 2], to: [f32; 2]) -> Ring {
     let (start_mm, end_mm) = (root(from[0], from[1]), root(to[0], to[1]));
     let way = [to[0] - from[0], to[1] - from[1]];
     let length_squared = way[0] * way[0] + way[1] * way[1];

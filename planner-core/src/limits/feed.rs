@@ -1,10 +1,10 @@
 //! How long a segment has to take.
 
 use super::config::{Bound, LimitsConfig, MotionLimits, Order, Part};
-use super::course::Course;
+use super::course::{Course, Region};
 use crate::config::RobotConfig;
 use crate::corner::CornerRule;
-use crate::kinematics::{Arm, RateBounds, Ring, RingBounds};
+use crate::kinematics::{Arm, ArmBounds, ArmKind, RateBounds, Ring};
 use crate::math::sqrt_f32;
 use crate::prefilter::Prefilter;
 use crate::units::TICK_S;
@@ -53,8 +53,7 @@ pub struct Limits {
     pub(super) joints: [Highest; 4],
     pub(super) path: Highest,
     pub(super) axis: Highest,
-    /// None of a robot that takes no limits.
-    arm: Option<RingBounds>,
+    pub(super) arm: ArmBounds,
     pub(super) boxes: Boxes,
     /// How far the command can be from a raw point of its window, in s of travel.
     reach_s: f32,
@@ -131,7 +130,7 @@ impl Boxes {
 /// Gives a prefilter the boxes that limits need, if it does not have them.
 ///
 /// A box that is missing gets the length with which a rapid just keeps the limits with the
-/// forearm square to the upper arm, within 10 and 200 ms.
+/// forearm square to the upper arm, within 10 and 200 ms; with all of a delta's.
 pub fn add_boxes(prefilter: &mut Prefilter, config: &LimitsConfig, arm: &Arm, rapid_mm_s: f32) {
     let needed = config.boxes_needed();
     let present = prefilter.boxes_s().len();
@@ -149,14 +148,24 @@ pub fn add_boxes(prefilter: &mut Prefilter, config: &LimitsConfig, arm: &Arm, ra
 
 /// The largest quotient of what a tool's mm moves and what is allowed of it.
 fn worst_quotient(config: &LimitsConfig, arm: &Arm, limit: impl Fn(&MotionLimits) -> f32) -> f32 {
-    let shape = arm.ring_bounds();
-    let [first, second, both] = shape.map_or([0.0; 3], |shape| shape.square());
+    // of joints 1 to 4
+    let turns = match arm.bounds() {
+        ArmBounds::Scara(shape) => {
+            let [first, second, both] = shape.square();
+            [first, second, 0.0, both]
+        }
+        ArmBounds::Delta(shape) => {
+            let turn = shape.square();
+            [turn, turn, turn, 0.0]
+        }
+    };
     let quotient = |(part, limits): (Part, &MotionLimits)| {
         let per_mm = match part {
-            Part::Joint(1) => first.to_degrees(),
-            Part::Joint(2) => second.to_degrees(),
-            Part::Joint(4) => both.to_degrees(),
-            Part::Joint(_) | Part::Path | Part::Axis => 1.0,
+            Part::Joint(joint) => turns
+                .get(usize::from(joint) - 1)
+                .filter(|turn| **turn > 0.0)
+                .map_or(1.0, |turn| turn.to_degrees()),
+            Part::Path | Part::Axis => 1.0,
         };
         let limit = limit(limits);
         if limit > 0.0 { per_mm / limit } else { 0.0 }
@@ -171,7 +180,9 @@ impl Limits {
     pub fn new(robot: &RobotConfig, arm: &Arm, prefilter: &Prefilter) -> Self {
         let config = &robot.limits;
         let mut joints = config.joints.map(|l| Highest::new(&l, 1_f32.to_radians()));
-        joints[2] = Highest::new(&config.joints[2], 1.0);
+        if arm.kind() == ArmKind::Scara {
+            joints[2] = Highest::new(&config.joints[2], 1.0);
+        }
         let needed = config.boxes_needed();
         let boxes_s = prefilter.boxes_s();
         let mut longest = boxes_s.iter().map(|s| *s as f32);
@@ -184,7 +195,7 @@ impl Limits {
             joints,
             path: Highest::new(&config.path, 1.0),
             axis: Highest::new(&config.axis, 1.0),
-            arm: arm.ring_bounds(),
+            arm: arm.bounds(),
             boxes: Boxes {
                 first_s,
                 second_s,
@@ -227,28 +238,44 @@ impl Limits {
         joint4.acceleration.is_finite() || joint4.jerk.is_finite()
     }
 
-    /// Lengths of upper arm and forearm.
-    pub(super) fn links_mm(&self) -> (f32, f32) {
-        self.arm.map_or((0.0, 0.0), |arm| arm.links_mm())
+    /// Which kind of robot they are for.
+    #[must_use]
+    pub const fn kind(&self) -> ArmKind {
+        self.arm.kind()
     }
 
-    /// The rule that a corner may have so that the command keeps away from the folded arm: a
-    /// tolerance of half of what the singularity margin leaves, and of what the path itself keeps
-    /// from it. A given overlap promises nothing, and stays.
+    /// How far from a segment a command may stray that rounds a corner, in mm, so that it keeps
+    /// away from a SCARA's folded arm or a delta's serial singularity: a part of what the
+    /// singularity margin leaves, and what the segment itself keeps from it.
     #[must_use]
-    pub fn rule(&self, rule: CornerRule, innermost_mm: f32) -> CornerRule {
-        let (CornerRule::ToleranceMm(tolerance_mm), Some(arm)) = (rule, self.arm) else {
-            return rule;
-        };
-        let kept_mm = innermost_mm - arm.programmed().inner_mm;
-        let spare_mm = arm.spare_mm() + kept_mm.max(0.0);
-        CornerRule::ToleranceMm(tolerance_mm.min(spare_mm))
+    pub fn spare_mm(&self, course: &Course) -> f32 {
+        match (&self.arm, &course.region) {
+            (ArmBounds::Scara(arm), Region::Ring(ring)) => {
+                arm.spare_mm() + (ring.inner_mm - arm.programmed().inner_mm).max(0.0)
+            }
+            (ArmBounds::Delta(arm), Region::Sweep(sweep)) => arm.spare_mm(sweep),
+            // a course is made for the robot's kind
+            _ => 0.0,
+        }
+    }
+
+    /// The rule that a corner may have between segments that leave `spare_mm`. A given overlap
+    /// promises nothing, and stays.
+    #[must_use]
+    pub fn rule(&self, rule: CornerRule, spare_mm: f32) -> CornerRule {
+        match rule {
+            CornerRule::ToleranceMm(tolerance_mm) => {
+                CornerRule::ToleranceMm(tolerance_mm.min(spare_mm))
+            }
+            CornerRule::OverlapPercent(_) => rule,
+        }
     }
 
     /// The shortest duration in s that keeps the limits while the segment is walked alone, and
     /// the limit that sets it; 0 if the segment may take half of `asked_s`.
     ///
-    /// At most 0.5 % longer than need be, mostly. Cost on a Cortex-M4F: below 20 000 instructions.
+    /// At most 0.5 % longer than need be, mostly. Cost on a Cortex-M4F: below 20 000 instructions
+    /// for a SCARA, 80 000 for a delta robot.
     #[must_use]
     pub fn least_s(&self, course: &Course, asked_s: f32) -> (f32, Option<Bound>) {
         if !self.is_set {
@@ -285,8 +312,11 @@ impl Limits {
         (high_s + yaw_s, bound)
     }
 
-    /// How long the yaw alone takes at the limits of joint 4.
+    /// How long the yaw alone takes at the limits of joint 4, where the tool moves that too.
     fn yaw_s(&self, course: &Course) -> f32 {
+        if self.kind() == ArmKind::Delta {
+            return 0.0;
+        }
         let load = self.boxes.load(course.yaw_rad, 0.0, 0.0);
         largest(Part::Joint(4), self.boxes.linear(&load, &self.joints[3])).0
     }
@@ -316,19 +346,25 @@ impl Limits {
         let plane = boxes.linear(&load(x_mm.max(y_mm)), &self.axis);
         take(largest(Part::Axis, plane));
         take(largest(Part::Axis, boxes.linear(&straight, &self.axis)));
-        take(largest(
-            Part::Joint(3),
-            boxes.linear(&straight, &self.joints[2]),
-        ));
-        let load = load(course.plane_mm);
-        let reach_mm = load.jerk.min(self.fastest_mm_s) * self.reach_s;
-        let ring = Ring {
-            inner_mm: course.ring.inner_mm - reach_mm,
-            outer_mm: course.ring.outer_mm + reach_mm,
+        let [joint1, joint2, joint3, joint4] = &self.joints;
+        // what moves as a part of the tool does, the length that moves the others, and those
+        let (linear, way_mm, turning) = match &self.arm {
+            ArmBounds::Scara(_) => (
+                (3, straight, joint3),
+                course.plane_mm,
+                [(1, joint1), (2, joint2), (4, joint4)],
+            ),
+            ArmBounds::Delta(_) => (
+                (4, boxes.load(course.yaw_rad * per_s, 0.0, 0.0), joint4),
+                course.length_mm,
+                [(1, joint1), (2, joint2), (3, joint3)],
+            ),
         };
-        let bounds = self.arm.map(|arm| arm.within(ring)).unwrap_or_default();
-        let [joint1, joint2, _, joint4] = &self.joints;
-        let turning = [(1, joint1), (2, joint2), (4, joint4)];
+        let (joint, alone, highest) = linear;
+        take(largest(Part::Joint(joint), boxes.linear(&alone, highest)));
+        let load = load(way_mm);
+        let reach_mm = load.jerk.min(self.fastest_mm_s) * self.reach_s;
+        let bounds = self.bounds(&course.region, reach_mm);
         for ((joint, highest), bounds) in turning.into_iter().zip(&bounds) {
             take(largest(
                 Part::Joint(joint),
@@ -336,6 +372,20 @@ impl Limits {
             ));
         }
         worst
+    }
+
+    /// Bounds for the joints that the tool turns, wherever it is so near a region: 1, 2 and their
+    /// sum of a SCARA, 1 to 3 of a delta robot.
+    pub(super) fn bounds(&self, region: &Region, reach_mm: f32) -> [RateBounds; 3] {
+        match (&self.arm, region) {
+            (ArmBounds::Scara(arm), Region::Ring(ring)) => arm.within(Ring {
+                inner_mm: ring.inner_mm - reach_mm,
+                outer_mm: ring.outer_mm + reach_mm,
+            }),
+            (ArmBounds::Delta(arm), Region::Sweep(sweep)) => arm.within(sweep, reach_mm),
+            // a course is made for the robot's kind
+            _ => [RateBounds::default(); 3],
+        }
     }
 }
 

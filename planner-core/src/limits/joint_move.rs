@@ -2,15 +2,18 @@
 
 use super::config::{Bound, Part};
 use super::feed::{Limits, largest};
+use crate::kinematics::ArmBounds;
 
 impl Limits {
     /// The shortest duration in s, `asked_s` or more, in which joints may go from rest to rest by
-    /// `ways` (rad, rad, mm, rad), each at constant speed.
+    /// `ways` (rad, and mm of joint 3 of a SCARA), each at constant speed.
     ///
     /// For the joints' own limits it is exact. The tool's limits are kept by bounds that hold
     /// in every posture, since where the arm homes the posture is not known: with
     /// `ω = |θ̇1| + |θ̇2|` the tool moves by `l1 |θ̇1| + l2 ω`, and each link adds `l ω²` to the
-    /// acceleration and `3 l ω ω̇ + l ω³` to the jerk.
+    /// acceleration and `3 l ω ω̇ + l ω³` to the jerk. Of a delta robot such bounds do not exist,
+    /// since near a parallel singularity the platform moves however slow the arms are: there the
+    /// joints' own limits are kept.
     #[must_use]
     pub fn joint_move_s(&self, ways: [f32; 4], asked_s: f32) -> (f32, Option<Bound>) {
         if !self.is_set() {
@@ -30,8 +33,11 @@ impl Limits {
                 self.boxes.linear(&load, highest),
             ));
         }
+        let ArmBounds::Scara(arm) = &self.arm else {
+            return (asked_s * worst.0, worst.1);
+        };
         let [way1, way2, way3, _] = ways.map(f32::abs);
-        let (link1_mm, link2_mm) = self.links_mm();
+        let (link1_mm, link2_mm) = arm.links_mm();
         let (turn1, turn12) = (way1 * per_s, (way1 + way2) * per_s);
         let (per_first, per_both) = (self.boxes.per_first, self.boxes.per_both);
         let (mut velocity, mut acceleration, mut jerk) = (0.0, 0.0, 0.0);

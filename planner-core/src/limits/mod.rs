@@ -41,7 +41,10 @@
 //! command is within `e*·m` of every raw point of the window, hence of that segment; there its
 //! condition bounds the joints for load e*, the more so for what the window really holds.
 //!
-//! Joint 4 is `c − θ1 − θ2`. The yaw's part of its limits and the tool's add up: the duration is
+//! The joints of a SCARA follow the tool's way in the plane, and joint 3 is its height; the arms
+//! of a delta robot follow its way in space, and joint 4 is the yaw alone.
+//!
+//! Joint 4 of a SCARA is `c − θ1 − θ2`. The yaw's part of its limits and the tool's add up: the duration is
 //! that for the tool alone and that for the yaw alone together. All left sides grow at least in proportion
 //! to the duration's inverse, so that shares of a limit add up to at most the whole also where
 //! several segments share a window.
@@ -60,18 +63,24 @@
 //! # Never a stall
 //! Conditions only get easier as the duration grows, and hold in the limit: the region shrinks to
 //! the segment, over which the bounds are finite because the singularity margin has been
-//! checked. A duration times the largest quotient of left and right side always keeps them.
+//! checked, and because corners are rounded within a part of what it leaves. A duration times the
+//! largest quotient of left and right side always keeps them.
 //!
 //! Overrides above 100 % are capped at the duration that keeps the limits; below, and in holds,
 //! everything only gets slower.
+//!
+//! # Hops
+//! A pick-and-place move is slowed down as a whole, by [`Limits::hop_slowdown`].
 
 mod config;
 mod course;
 mod feed;
+mod hop;
 mod joint_move;
 mod run;
 
 pub use config::{Bound, Limited, LimitsConfig, MotionLimits, Order, Part};
-pub use course::Course;
+pub use course::{Course, Region};
 pub use feed::{Limits, add_boxes};
+pub use hop::HopSlowdown;
 pub use run::{Choice, Run};

@@ -1,7 +1,8 @@
 //! What of the past a corner must heed, and whether to stop at it.
 
-use super::course::Course;
+use super::course::{Course, Region};
 use super::feed::Limits;
+use crate::kinematics::ArmKind;
 use crate::math::sqrt_f32;
 
 /// How a segment is walked, chosen by [`Run::choose`].
@@ -39,8 +40,8 @@ pub struct Run {
     newer_s: f32,
     /// Tangent at the end of the last segment; none from rest.
     last_tangent: Option<[f32; 3]>,
-    /// How close the last segment came to the shoulder, in mm.
-    innermost_mm: f32,
+    /// How far from the last segment a command may stray, in mm.
+    spare_mm: f32,
 }
 
 /// Change of the tangent up to which velocities of any two speeds differ by no more than the
@@ -86,12 +87,13 @@ impl Run {
         }
     }
 
-    /// How close the segments beside the next corner come to the shoulder, in mm.
+    /// How far from the segments beside the next corner a command may stray, in mm.
     #[must_use]
-    pub fn innermost_mm(&self, course: &Course) -> f32 {
+    pub fn spare_mm(&self, limits: &Limits, course: &Course) -> f32 {
+        let own_mm = limits.spare_mm(course);
         match self.last_tangent {
-            Some(_) => course.ring.inner_mm.min(self.innermost_mm),
-            None => course.ring.inner_mm,
+            Some(_) => own_mm.min(self.spare_mm),
+            None => own_mm,
         }
     }
 
@@ -130,10 +132,11 @@ impl Run {
             }
         }
         self.last_tangent = Some(course.last_tangent);
-        self.innermost_mm = course.ring.inner_mm;
+        self.spare_mm = limits.spare_mm(course);
     }
 
-    /// `|u₂ − u₁|` at the corner before a segment, in the plane or in space, whichever is more.
+    /// `|u₂ − u₁|` at the corner before a segment, in space or, where joints move as the tool does
+    /// in the plane, there if that is more.
     fn turn(&self, course: &Course) -> f32 {
         let Some([x1, y1, z1]) = self.last_tangent else {
             return 0.0;
@@ -143,7 +146,8 @@ impl Run {
         let (dx, dy, dz) = (x2 - x1, y2 - y1, z2 - z1);
         let space = square(dx, dy) + dz * dz;
         let (flat1, flat2) = (square(x1, y1), square(x2, y2));
-        let plane = if flat1 > 0.0 && flat2 > 0.0 {
+        let counts = matches!(course.region, Region::Ring(_));
+        let plane = if counts && flat1 > 0.0 && flat2 > 0.0 {
             // |a/|a| − b/|b||² = 2 − 2 a·b/(|a||b|)
             let cosine = (x1 * x2 + y1 * y2) / sqrt_f32(flat1 * flat2);
             (2.0 - 2.0 * cosine).max(0.0)
@@ -161,7 +165,11 @@ impl Run {
         let directions = self.older.directions | self.newer.directions | directions(course);
         let mut reversed = directions & (directions >> 3) & 0b111;
         if !limits.limits_axes() {
-            reversed &= 0b100;
+            // joint 3 of a SCARA is an axis
+            reversed &= match limits.kind() {
+                ArmKind::Scara => 0b100,
+                ArmKind::Delta => 0,
+            };
         }
         let bent = self.older.bent || self.newer.bent || is_bent(limits, course);
         reversed == 0 && !bent && self.older.turn + self.newer.turn + turn <= GENTLE
