@@ -189,7 +189,6 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
             },
         },
         ConfigError::LimitsOnDelta => vec!["limits"],
-        ConfigError::LimitsOnMap => vec!["map", "limits"],
         ConfigError::Range { name, .. } => match *name {
             "tolerance" => vec!["motion.corner_tolerance_mm"],
             "overlap" => vec!["motion.corner_overlap_percent"],
