@@ -187,7 +187,6 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
                 _ => vec!["hop.acceleration_mm_s2"],
             },
         },
-        ConfigError::LimitsOnMap => vec!["map", "limits"],
         ConfigError::Range { name, .. } => match *name {
             "tolerance" => vec!["motion.corner_tolerance_mm"],
             "overlap" => vec!["motion.corner_overlap_percent"],

@@ -13,6 +13,7 @@ use planner_core::limits::{Bound, LimitsConfig, MotionLimits, Part};
 use planner_core::motion::{DelayLines, Order, Setpoint};
 use planner_core::planner::Cause;
 use planner_core::pose::JointUnit;
+use planner_core::posture::{MapNode, ModeMapConfig, PostureMethod};
 use planner_core::prefilter::Kind;
 use planner_core::queue::SegmentQueue;
 use rand::{RngExt, SeedableRng};
@@ -534,7 +535,39 @@ fn limits_are_used() {
     }
 }
 
-/// Holds, resumes and overrides at random instants, of programs that also change the elbow.
+/// Holds, resumes and overrides at random instants.
+fn disturbed(robot: &Robot, program: &str, rng: &mut ChaCha8Rng) -> Vec<Setpoint> {
+    let mut queue = SegmentQueue::new();
+    let mut filters = Box::new(DelayLines::new());
+    let mut all = Vec::new();
+    let mut next = 0;
+    let mut held = false;
+    let order = |tick: usize| {
+        if tick < next {
+            return None;
+        }
+        let longest = [20, 400, 3000][rng.random_range(0..3)];
+        next = tick + rng.random_range(1..longest);
+        if held {
+            held = false;
+            return Some(Order::Resume);
+        }
+        if rng.random_bool(0.5) {
+            held = true;
+            return Some(Order::Hold);
+        }
+        Some(Order::Rates {
+            feed_percent: rng.random_range(10..=200),
+            rapid_percent: [25, 50, 100][rng.random_range(0..3)],
+        })
+    };
+    Controller::new(&mut robot.clone(), &mut queue, &mut filters)
+        .run_with_orders(program, order, |setpoint| all.push(*setpoint))
+        .expect("the program runs");
+    all
+}
+
+/// Programs that also change the elbow.
 #[test]
 fn no_limit_is_passed_with_holds_and_overrides() {
     for seed in 0..36 {
@@ -550,10 +583,88 @@ fn no_limit_is_passed_with_holds_and_overrides() {
             program = program.replace("M2\n", "M101\nG1 X230 Y40\nM102\nG1 X200 Y0\nM2\n");
         }
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let all = disturbed(&robot, &program, &mut rng, true);
+        let all = disturbed(&robot, &program, &mut rng);
         let what = format!("seed {seed}, {kind:?}\n{program}");
         assert_kept(&robot, &all, Longest::arc(450.0), &what);
     }
+}
+
+/// 20 Hz at X 100 and 8 Hz at X 330.
+fn map() -> ModeMapConfig {
+    let mut map = ModeMapConfig {
+        x_mm: [100.0, 330.0],
+        columns: 2,
+        rows: 1,
+        ..ModeMapConfig::NONE
+    };
+    map.nodes[0] = MapNode::new(20.0, 0.02);
+    map.nodes[1] = MapNode::new(8.0, 0.02);
+    map
+}
+
+/// Robots whose prefilter follows a map: by name, of pure shapers to which limits add boxes, of
+/// two boxes, and chosen automatically.
+fn following(nth: u64, config: &mut RobotConfig) {
+    config.map = map();
+    config.prefilter.kind = match nth % 8 {
+        0 | 1 => Kind::FirZvd,
+        2 => Kind::Zv,
+        3 => Kind::None,
+        4 => Kind::FirEi,
+        _ => Kind::Fir,
+    };
+    match nth % 8 {
+        5 => config.posture_method = PostureMethod::Hybrid,
+        6 => config.posture_method = PostureMethod::Auto,
+        7 => config.automatic = true,
+        _ => {}
+    }
+}
+
+#[test]
+fn no_limit_is_passed_where_the_prefilter_follows_a_map() {
+    no_limit_is_passed_with_a_map(0..16);
+}
+
+#[test]
+#[ignore = "long: a hundred programs, each twice"]
+fn no_limit_is_passed_on_a_hundred_programs_where_the_prefilter_follows_a_map() {
+    no_limit_is_passed_with_a_map(16..116);
+}
+
+/// Each program as it is, and with holds and overrides.
+fn no_limit_is_passed_with_a_map(seeds: std::ops::Range<u64>) {
+    let mut binding = 0;
+    let count = seeds.end - seeds.start;
+    for seed in seeds {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let limits = random_limits(&mut rng, ArmKind::Scara);
+        let robot = robot(|config| {
+            following(seed, config);
+            config.limits = limits;
+            // full stops, from which prefilters change, among corners that share one
+            config.corner_tolerance_mm = [0.5, 0.0, 0.05][seed as usize % 3];
+        });
+        let longest_mm = [150.0, 20.0][usize::from(seed % 5 == 0)];
+        let shape = Shape {
+            smooth: if seed % 3 == 0 { 0.9 } else { 0.3 },
+            longest_mm,
+            ..Shape::default()
+        };
+        let program = random_program(seed, shape);
+        let longest = Longest::arc(3.0 * longest_mm);
+        let smooth = used(&robot, &setpoints(&robot, &program), longest);
+        let all = disturbed(&robot, &program, &mut rng);
+        let disturbed = used(&robot, &all, longest);
+        for used in [&smooth, &disturbed] {
+            assert!(
+                largest(used) <= SPARE,
+                "seed {seed}: {used:?}\n{limits:?}\n{program}"
+            );
+        }
+        binding += u64::from(largest(&smooth) > 0.4);
+    }
+    assert!(binding * 10 > count * 9, "{binding} of {count}");
 }
 
 #[test]
@@ -635,7 +746,11 @@ fn no_limit_is_passed_on_random_hops() {
         });
         let program = random_hops(&mut rng, arm);
         let is_disturbed = seed / 6 % 2 == 1;
-        let all = disturbed(&robot, &program, &mut rng, is_disturbed);
+        let all = if is_disturbed {
+            disturbed(&robot, &program, &mut rng)
+        } else {
+            setpoints(&robot, &program)
+        };
         let longest = Longest {
             hop_mm: if axes == HopAxes::All { 0.0 } else { 800.0 },
             ..Longest::default()
@@ -666,43 +781,6 @@ fn no_limit_is_passed_on_random_hops() {
             .all(|count| u64::from(*count) * 3 > COUNT / 4 * 2),
         "{binding:?}"
     );
-}
-
-/// The setpoints of a program that is held, resumed and slowed down at random, or not.
-fn disturbed(
-    robot: &Robot,
-    program: &str,
-    rng: &mut ChaCha8Rng,
-    is_disturbed: bool,
-) -> Vec<Setpoint> {
-    let mut queue = SegmentQueue::new();
-    let mut filters = Box::new(DelayLines::new());
-    let mut all = Vec::new();
-    let mut next = 0;
-    let mut held = false;
-    let order = |tick: usize| {
-        if !is_disturbed || tick < next {
-            return None;
-        }
-        let longest = [20, 400, 3000][rng.random_range(0..3)];
-        next = tick + rng.random_range(1..longest);
-        if held {
-            held = false;
-            return Some(Order::Resume);
-        }
-        if rng.random_bool(0.5) {
-            held = true;
-            return Some(Order::Hold);
-        }
-        Some(Order::Rates {
-            feed_percent: rng.random_range(10..=200),
-            rapid_percent: [25, 50, 100][rng.random_range(0..3)],
-        })
-    };
-    Controller::new(&mut robot.clone(), &mut queue, &mut filters)
-        .run_with_orders(program, order, |setpoint| all.push(*setpoint))
-        .expect("the program runs");
-    all
 }
 
 /// How near a limit a hop comes where a limit alone holds it back.

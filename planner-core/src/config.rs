@@ -93,9 +93,6 @@ pub enum ConfigError {
     Follow(FollowError),
     /// Pick-and-place moves.
     Hop(HopError),
-    /// Limits of acceleration or jerk beside a map of the mode: where the prefilter changes on
-    /// the way of a move, they are not kept.
-    LimitsOnMap,
     /// A plain number is out of its range.
     Range {
         /// Name of the setting.
@@ -141,9 +138,6 @@ impl fmt::Display for ConfigError {
             Self::Prefilter(error) => error.fmt(f),
             Self::Follow(error) => error.fmt(f),
             Self::Hop(error) => error.fmt(f),
-            Self::LimitsOnMap => f.write_str(
-                "limits of acceleration and jerk are not kept while the prefilter follows a map of the mode or is chosen automatically: leave out either",
-            ),
             Self::Range {
                 name,
                 value,
@@ -200,7 +194,7 @@ impl Robot {
     pub fn unfiltered(config: &RobotConfig, arm: Arm) -> Self {
         Self {
             config: *config,
-            limits: Limits::new(config, &arm, &Prefilter::NONE),
+            limits: Limits::new(config, &arm, &Prefilter::NONE, 0.0),
             arm,
             follower: None,
             tuning: Tuning::Named(config.prefilter),
@@ -228,10 +222,12 @@ impl Robot {
     fn take_config(&mut self, config: &RobotConfig) -> Result<Tuning, ConfigError> {
         check_ranges(config)?;
         let arm = arm(config)?;
+        let mut prefilter = config.prefilter;
+        add_boxes(&mut prefilter, config, &arm, config.automatic);
         let mut follower = None;
-        make_follower(&mut follower, config, &config.prefilter, config.automatic)?;
-        let tuning = first_tuning(&config.prefilter, follower.as_ref());
-        check_tuning(config, &arm, &tuning)?;
+        make_follower(&mut follower, config, &prefilter, config.automatic)?;
+        let tuning = first_tuning(&prefilter, follower.as_ref());
+        check_tuning(&tuning)?;
         // nothing fails from here on
         self.config = *config;
         self.arm = arm;
@@ -254,11 +250,12 @@ impl Robot {
     pub fn set_prefilter(&mut self, config: &PrefilterConfig) -> Result<(), ConfigError> {
         let stays_automatic = self.stays_automatic(config);
         let mut follower = None;
-        make_follower(&mut follower, &self.config, config, stays_automatic)?;
-        self.tune(&first_tuning(config, follower.as_ref()))?;
+        let tuning = self.take_follower(&mut follower, config, stays_automatic)?;
+        // nothing fails from here on
         self.follower = follower;
         self.config.prefilter = *config;
         self.config.automatic = stays_automatic;
+        self.tune(&tuning)?;
         Ok(())
     }
 
@@ -269,17 +266,25 @@ impl Robot {
     /// As [`Robot::set_prefilter`].
     #[inline(never)]
     pub fn check_prefilter(&self, config: &PrefilterConfig) -> Result<(), ConfigError> {
-        check_taps(&self.first_tuning_by(config)?)?;
+        self.take_follower(&mut None, config, self.stays_automatic(config))?;
         Ok(())
     }
 
-    /// What the prefilter is made of at first, once its settings are these.
+    /// Makes what follows the map in its place, and yields what the prefilter is made of at
+    /// first, once its settings are these.
     #[inline(never)]
-    fn first_tuning_by(&self, config: &PrefilterConfig) -> Result<Tuning, ConfigError> {
-        let mut follower = None;
-        let stays_automatic = self.stays_automatic(config);
-        make_follower(&mut follower, &self.config, config, stays_automatic)?;
-        Ok(first_tuning(config, follower.as_ref()))
+    fn take_follower(
+        &self,
+        place: &mut Option<Follower>,
+        config: &PrefilterConfig,
+        automatic: bool,
+    ) -> Result<Tuning, ConfigError> {
+        let mut prefilter = *config;
+        add_boxes(&mut prefilter, &self.config, &self.arm, automatic);
+        make_follower(place, &self.config, &prefilter, automatic)?;
+        let tuning = first_tuning(&prefilter, place.as_ref());
+        check_tuning(&tuning)?;
+        Ok(tuning)
     }
 
     fn stays_automatic(&self, config: &PrefilterConfig) -> bool {
@@ -293,9 +298,10 @@ impl Robot {
     #[inline(never)]
     pub fn tune(&mut self, tuning: &Tuning) -> Result<(), PrefilterError> {
         let mut prefilter = Prefilter::NONE;
-        make_prefilter(&mut prefilter, &self.config, &self.arm, tuning)?;
+        tuning.make(&mut prefilter)?;
         set_kernel(&mut self.kernel, &prefilter)?;
-        self.limits = Limits::new(&self.config, &self.arm, &prefilter);
+        let reach_s = self.follower.as_ref().map_or(0.0, Follower::reach_s);
+        self.limits = Limits::new(&self.config, &self.arm, &prefilter, reach_s);
         self.accelerating.set(prefilter.stages(), false);
         self.decelerating.set(prefilter.stages(), true);
         self.longest_box_s = longest_box_s(&prefilter);
@@ -308,17 +314,33 @@ impl Robot {
     pub fn prefilter(&self) -> Prefilter {
         let mut prefilter = Prefilter::NONE;
         // one of this tuning has been made before: this does not fail
-        let _ = make_prefilter(&mut prefilter, &self.config, &self.arm, &self.tuning);
+        let _ = self.tuning.make(&mut prefilter);
         prefilter
     }
 
-    /// The boxes that the prefilter was given because limits need them, in s.
+    /// The boxes that the prefilter was given because limits need them, in s; where it is chosen
+    /// automatically, those that any choice has.
     pub fn added_boxes_s(&self) -> impl Iterator<Item = f64> {
-        let own = self.tuning.prefilter();
-        let own = own.map(|own| own.boxes_s()).unwrap_or_default();
-        let all = self.prefilter().boxes_s();
-        all.into_iter()
-            .filter(move |length_s| !own.contains(length_s))
+        let own_ms = self.config.prefilter.smoothing_ms;
+        let mut added_s = [None; 2];
+        let mut look = |tuning: &Tuning| {
+            let Tuning::Named(config) = tuning else {
+                return;
+            };
+            let boxes_s = Prefilter::boxes_of(config);
+            let both_ms = config.smoothing_ms.into_iter().zip(own_ms);
+            for (added_s, (length_ms, own_ms)) in added_s.iter_mut().zip(both_ms) {
+                let length_s = f64::from(length_ms) / 1e3;
+                if length_ms != own_ms && boxes_s.contains(&length_s) {
+                    *added_s = Some(length_s);
+                }
+            }
+        };
+        look(&self.tuning);
+        if let Some(follower) = &self.follower {
+            follower.each_slowest(look);
+        }
+        added_s.into_iter().flatten()
     }
 }
 
@@ -333,15 +355,7 @@ fn set_kernel(kernel: &mut Kernel, prefilter: &Prefilter) -> Result<(), Prefilte
 
 /// Whether there are taps for the prefilter of a tuning.
 #[inline(never)]
-fn check_tuning(config: &RobotConfig, arm: &Arm, tuning: &Tuning) -> Result<(), PrefilterError> {
-    let mut prefilter = Prefilter::NONE;
-    make_prefilter(&mut prefilter, config, arm, tuning)?;
-    Kernel::new(&prefilter).map(drop)
-}
-
-/// The same without what limits add.
-#[inline(never)]
-fn check_taps(tuning: &Tuning) -> Result<(), PrefilterError> {
+fn check_tuning(tuning: &Tuning) -> Result<(), PrefilterError> {
     let mut prefilter = Prefilter::NONE;
     tuning.make(&mut prefilter)?;
     Kernel::new(&prefilter).map(drop)
@@ -361,19 +375,6 @@ pub fn arm(config: &RobotConfig) -> Result<Arm, ConfigError> {
 
 fn longest_box_s(prefilter: &Prefilter) -> Option<f32> {
     prefilter.longest_box_s().map(|length_s| length_s as f32)
-}
-
-/// Makes the prefilter of a tuning, with the boxes that the robot's limits need.
-#[inline(never)]
-fn make_prefilter(
-    prefilter: &mut Prefilter,
-    robot: &RobotConfig,
-    arm: &Arm,
-    tuning: &Tuning,
-) -> Result<(), PrefilterError> {
-    tuning.make(prefilter)?;
-    add_boxes(prefilter, &robot.limits, arm, robot.rapid_mm_s);
-    Ok(())
 }
 
 /// Whether all plain numbers are within their ranges.
@@ -405,9 +406,6 @@ fn check_ranges(config: &RobotConfig) -> Result<(), ConfigError> {
 
 fn check_limits(config: &RobotConfig) -> Result<(), ConfigError> {
     let limits = &config.limits;
-    if (config.map.is_some() || config.automatic) && limits.boxes_needed() > 0 {
-        return Err(ConfigError::LimitsOnMap);
-    }
     for (part, values) in limits.all() {
         let names = limit_names(part);
         let values = [values.velocity, values.acceleration, values.jerk];
@@ -905,15 +903,41 @@ mod tests {
         };
         assert_eq!(refused(|_| {}), None);
         assert_eq!(refused(|config| config.arm = ArmKind::Delta), None);
-        let on_map =
-            refused(|config| config.map = ModeMapConfig::constant(MapNode::new(9.0, 0.02)));
-        assert_eq!(on_map, Some(ConfigError::LimitsOnMap));
-        let automatic = refused(|config| config.automatic = true);
-        assert_eq!(automatic, Some(ConfigError::LimitsOnMap));
-        // a limit of velocity needs no box, which the map could change
-        let mut config = RobotConfig::default();
-        config.set("path-velocity=100").unwrap();
-        config.map = ModeMapConfig::constant(MapNode::new(9.0, 0.02));
-        assert!(Robot::new(&config).is_ok());
+    }
+
+    #[test]
+    fn prefilters_that_follow_a_map_get_the_boxes_that_limits_need() {
+        let robot = |settings: &str, follows: bool| {
+            let mut config = RobotConfig::default();
+            config.set_all(settings).unwrap();
+            if follows {
+                config.map = ModeMapConfig::constant(MapNode::new(9.0, 0.02));
+            }
+            Robot::new(&config).unwrap()
+        };
+        let added =
+            |settings: &str, follows: bool| robot(settings, follows).added_boxes_s().count();
+        for follows in [false, true] {
+            assert_eq!(added("prefilter=zv path-velocity=100", follows), 0);
+            assert_eq!(added("prefilter=zv path-acceleration=100", follows), 1);
+            assert_eq!(added("prefilter=zv path-jerk=1000", follows), 2);
+            assert_eq!(added("prefilter=fir path-jerk=1000", follows), 1);
+            assert_eq!(added("prefilter=s-curve path-jerk=1000", follows), 0);
+            // those that are given count
+            assert_eq!(
+                added("prefilter=zv smoothing1-ms=30 path-jerk=1000", follows),
+                1
+            );
+            assert_eq!(
+                added("prefilter=zv smoothing2-ms=30 path-acceleration=9", follows),
+                0
+            );
+            assert_eq!(added("automatic=1 path-jerk=1000", follows), 2);
+        }
+        assert_eq!(added("posture-method=a path-jerk=1000", true), 0);
+        let boxes_s = robot("prefilter=zv path-jerk=1000", true)
+            .prefilter()
+            .boxes_s();
+        assert_eq!(boxes_s.len(), 2);
     }
 }

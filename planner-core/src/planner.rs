@@ -10,7 +10,7 @@ use crate::gcode::{
 };
 use crate::hop::{self, Hop, HopConfig, HopError, HopLimits};
 use crate::kinematics::{Arm, Elbow, PoseError, SegmentError};
-use crate::limits::{Course, Limited};
+use crate::limits::{BoxRange, Course, Limited};
 use crate::path::{PathSegment, Shape};
 use crate::pose::{JointPosition, JointUnit, Pose};
 use crate::posture::{MoveToFollow, MoveTunings, Tuning};
@@ -487,11 +487,12 @@ impl<'q> Planner<'q> {
             shortest_s: share * timing.shortest_s,
             ..*timing
         };
+        let mut boxes = self.robot.limits.box_range();
         let mut queued = false;
         for number in 0..chords.count {
             let chord = chords.chord(&order, number);
             if self.robot.limits.is_set() {
-                self.limit(&chord.path, &mut timing);
+                self.limit(&chord.path, &mut timing, &mut boxes);
             }
             queued |= self.plan_segment(&chord, &timing);
         }
@@ -551,7 +552,7 @@ impl<'q> Planner<'q> {
         let from_rest = self.schedule.begins_from_rest(order.corner);
         let step = MoveToFollow {
             course: follower.course(&order.path),
-            duration_s: timing.duration_s,
+            duration_s: timing.duration_s.max(timing.least_s.into()),
             from_rest,
             is_line: matches!(order.path.shape, Shape::Line),
             after_arc: !from_rest && self.schedule.follows_arc(),
@@ -650,8 +651,10 @@ impl<'q> Planner<'q> {
             arm.check(&pose).map_err(Cause::Pose)?;
         }
         let mut timings = [Timing::default(); 2];
+        // the second move begins with what the first one has changed to
+        let mut boxes = self.robot.limits.box_range();
         for (order, timing) in command.moves().zip(&mut timings) {
-            *timing = self.checked_timing(arm, order)?;
+            *timing = self.checked_timing(arm, order, &mut boxes)?;
         }
         Ok(timings)
     }
@@ -746,14 +749,20 @@ impl<'q> Planner<'q> {
         hop::plan(order.start, order.target, wanted, limits, &prefilter)
     }
 
-    /// How long a motion takes; zero if it is shorter than anything.
-    fn checked_timing(&self, arm: &Arm, order: &Move) -> Result<Timing, Cause> {
+    /// How long a motion takes; zero if it is shorter than anything. To the boxes that may be in
+    /// force before it, it adds those that may be on its way.
+    fn checked_timing(
+        &self,
+        arm: &Arm,
+        order: &Move,
+        boxes: &mut BoxRange,
+    ) -> Result<Timing, Cause> {
         let mut timing = self.timing(&order.path, order.feed);
         if timing.duration_s > 0.0 && timing.duration_s <= LONGEST_S {
             let checked = arm.check_segment(&order.path);
             checked.map_err(Cause::Segment)?;
             if self.robot.limits.is_set() {
-                self.limit(&order.path, &mut timing);
+                self.limit(&order.path, &mut timing, boxes);
             }
         }
         // A segment that may not take its full feed takes half of it at the least.
@@ -764,13 +773,22 @@ impl<'q> Planner<'q> {
         Ok(timing)
     }
 
-    /// How long a segment takes at the robot's limits of motion.
-    fn limit(&self, path: &PathSegment, timing: &mut Timing) {
+    /// How long a segment takes at the robot's limits of motion, whichever prefilters it gets.
+    /// Not inlined, as [`Planner::elbow_move`].
+    #[inline(never)]
+    fn limit(&self, path: &PathSegment, timing: &mut Timing, boxes: &mut BoxRange) {
         // what the highest override could make of it
         let hurried_s = (0.5 * timing.duration_s).max(timing.shortest_s);
         let asked_s = hurried_s.max(TICK_S) as f32;
         let course = Course::new(path, self.robot.limits.kind());
-        (timing.least_s, timing.bound) = self.robot.limits.least_s(&course, asked_s);
+        let limits = &self.robot.limits;
+        (timing.least_s, timing.bound) = match &self.robot.follower {
+            Some(follower) if limits.needs_boxes() => {
+                follower.add_boxes(boxes, &follower.course(path));
+                limits.within(boxes).least_s(&course, asked_s)
+            }
+            _ => limits.least_s(&course, asked_s),
+        };
     }
 
     /// Stops, then stands for so long; where the position is unknown nothing has moved.

@@ -223,7 +223,12 @@ impl<'q> Schedule<'q> {
         };
         if let Some((course, choice)) = &limited {
             let dwell_s = seconds(settled - overlap);
-            let shortest_s = seconds(top_rate.real(segment.duration.min(ONE_TICK << 13)));
+            let shortest_s = if on_the_way.is_some() {
+                // the filter of what comes has seen this line only
+                f32::INFINITY
+            } else {
+                seconds(top_rate.real(segment.duration.min(ONE_TICK << 13)))
+            };
             self.run.take(limits, course, choice, dwell_s, shortest_s);
         }
         let segment = RawSegment {

@@ -99,7 +99,7 @@ fn regions_in_the_middle_are_not_much_worse_than_what_is_in_them() {
     ] {
         let mut loosest = [0.0_f64; 3];
         for turn in 0..12 {
-            let (sin, cos) = (f64::from(turn) * 0.523_6).sin_cos();
+            let (sin, cos) = (f64::from(turn) * std::f64::consts::FRAC_PI_6).sin_cos();
             let half = 0.5 * length_mm;
             let from = [-half * cos, -half * sin, -714.0];
             let to = [half * cos, half * sin, -714.0];
@@ -157,8 +157,8 @@ proptest! {
     /// An arc is bounded by the pieces that its sagitta widens.
     #[test]
     fn an_arc_is_bounded_along_its_way(
-        centre in somewhere(), radius in 1.0_f64..100.0, start in 0.0_f64..6.28,
-        sweep in -6.28_f64..6.28, u in 0.0_f64..1.0
+        centre in somewhere(), radius in 1.0_f64..100.0, start in 0.0..TAU,
+        sweep in -TAU..TAU, u in 0.0_f64..1.0
     ) {
         let (delta, geometry) = default_robot();
         let centre = [0.7 * centre[0], 0.7 * centre[1], centre[2]];

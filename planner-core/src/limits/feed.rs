@@ -1,12 +1,13 @@
 //! How long a segment has to take.
 
+use super::box_range::BoxRange;
 use super::config::{Bound, LimitsConfig, MotionLimits, Order, Part};
 use super::course::{Course, Region};
 use crate::config::RobotConfig;
 use crate::corner::CornerRule;
 use crate::kinematics::{Arm, ArmBounds, ArmKind, RateBounds, Ring};
 use crate::math::sqrt_f32;
-use crate::prefilter::Prefilter;
+use crate::prefilter::{Kind, Prefilter, PrefilterConfig};
 use crate::units::TICK_S;
 
 /// Kept of every limit for roundings: of weights to 2^-30, of rates to `f32`.
@@ -18,9 +19,9 @@ const ROUNDS: usize = 7;
 /// A duration found is at most so much longer than need be.
 const CLOSE: f32 = 1.005;
 
-/// Lengths of the boxes that a prefilter is given, in s: short enough to leave the robot
+/// Lengths of the boxes that a prefilter is given, in ms: short enough to leave the robot
 /// quick, long enough to be many ticks.
-const BOX_S: (f64, f64) = (0.01, 0.2);
+const BOX_MS: (f32, f32) = (10.0, 200.0);
 
 /// Limits in mm, rad and s; infinite where there is none.
 #[derive(Clone, Copy, Debug)]
@@ -67,11 +68,11 @@ pub struct Limits {
 /// What the boxes make of a jump of the velocity.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Boxes {
-    /// Longest box in s; 0 if accelerations are not limited.
+    /// Longest box in s, of the prefilter where it is longest; 0 if accelerations are not limited.
     pub first_s: f32,
-    /// Second longest; 0 if jerks are not limited.
+    /// Second longest, likewise; 0 if jerks are not limited.
     pub second_s: f32,
-    /// `1/T1` and `2/(T1 T2)`; 0 likewise.
+    /// `1/T1` and `2/(T1 T2)` of the shortest ones; 0 likewise.
     pub per_first: f32,
     pub per_both: f32,
 }
@@ -85,6 +86,24 @@ pub(super) struct Load {
 }
 
 impl Boxes {
+    /// The first `needed` of the boxes within a range.
+    fn new(range: &BoxRange, needed: usize) -> Self {
+        let if_needed = |[first_s, second_s]: [f32; 2]| match needed {
+            0 => [0.0; 2],
+            1 => [first_s, 0.0],
+            _ => [first_s, second_s],
+        };
+        let inverse = |s: f32| if s > 0.0 { 1.0 / s } else { 0.0 };
+        let [first_s, second_s] = if_needed(range.longest_s);
+        let [shortest_s, second_shortest_s] = if_needed(range.shortest_s);
+        Self {
+            first_s,
+            second_s,
+            per_first: inverse(shortest_s),
+            per_both: 2.0 * inverse(shortest_s * second_shortest_s),
+        }
+    }
+
     /// The load of a segment of `length_mm`. However fast the raw path is, the box spreads the
     /// length over its own, so that the curve is never taken faster than `L / T1`.
     pub(super) fn load(&self, speed: f32, curvature: f32, length_mm: f32) -> Load {
@@ -127,22 +146,49 @@ impl Boxes {
     }
 }
 
-/// Gives a prefilter the boxes that limits need, if it does not have them.
+/// Gives the settings of prefilters the boxes that limits need, as smoothing: every prefilter
+/// made from them has as many then, whatever its mode and, if it is chosen automatically, its kind.
 ///
 /// A box that is missing gets the length with which a rapid just keeps the limits with the
-/// forearm square to the upper arm, within 10 and 200 ms; with all of a delta's.
-pub fn add_boxes(prefilter: &mut Prefilter, config: &LimitsConfig, arm: &Arm, rapid_mm_s: f32) {
+/// forearm square to the upper arm, within 10 and 200 ms; with all of a delta's. The second one is
+/// that beside the shortest first one that there is.
+#[inline(never)]
+pub fn add_boxes(prefilter: &mut PrefilterConfig, robot: &RobotConfig, arm: &Arm, automatic: bool) {
+    let (config, rapid_mm_s) = (&robot.limits, robot.rapid_mm_s);
     let needed = config.boxes_needed();
-    let present = prefilter.boxes_s().len();
-    if present < 1 && needed >= 1 {
+    let length_ms = |length_s: f32| (1e3 * length_s).clamp(BOX_MS.0, BOX_MS.1);
+    let [first_ms, second_ms] = prefilter.smoothing_ms;
+    // one that is given as the second is the first of a prefilter without a box
+    if first_ms == 0.0 && needed > usize::from(second_ms > 0.0) {
         let quotient = worst_quotient(config, arm, |limits| limits.acceleration);
-        prefilter.add_box(f64::from(rapid_mm_s * quotient).clamp(BOX_S.0, BOX_S.1));
+        prefilter.smoothing_ms[0] = length_ms(rapid_mm_s * quotient);
     }
-    if present < 2 && needed >= 2 {
+    if second_ms == 0.0 && needed >= 2 {
         let quotient = worst_quotient(config, arm, |limits| limits.jerk);
-        let first_s = prefilter.longest_box_s().unwrap_or(BOX_S.1);
-        let second_s = f64::from(2.0 * rapid_mm_s * quotient) / first_s;
-        prefilter.add_box(second_s.clamp(BOX_S.0, BOX_S.1));
+        let first_s = shortest_first_box_s(prefilter, robot, automatic);
+        prefilter.smoothing_ms[1] = length_ms(2.0 * rapid_mm_s * quotient / first_s);
+    }
+}
+
+/// The shortest first box of the prefilters made from these settings: that for the fastest mode.
+fn shortest_first_box_s(prefilter: &PrefilterConfig, robot: &RobotConfig, automatic: bool) -> f32 {
+    let nodes = robot.map.used().iter().map(|node| node.frequency_hz());
+    let fastest_hz = nodes.reduce(f32::max).filter(|_| robot.map.is_complete());
+    let first_box_s = |kind| {
+        let boxes_s = Prefilter::boxes_of(&PrefilterConfig {
+            kind,
+            frequency_hz: fastest_hz.unwrap_or(prefilter.frequency_hz),
+            ..*prefilter
+        });
+        boxes_s
+            .first()
+            .map_or(f32::INFINITY, |length_s| *length_s as f32)
+    };
+    if automatic {
+        // all kinds that are chosen have boxes of a period, or none
+        first_box_s(Kind::None).min(first_box_s(Kind::Fir))
+    } else {
+        first_box_s(prefilter.kind)
     }
 }
 
@@ -174,40 +220,54 @@ fn worst_quotient(config: &LimitsConfig, arm: &Arm, limit: impl Fn(&MotionLimits
 }
 
 impl Limits {
-    /// The limits of a robot with this arm and prefilter. The prefilter has the boxes that
-    /// they need: see [`add_boxes`].
+    /// The limits of a robot with this arm and prefilter, which has the boxes that they need:
+    /// see [`add_boxes`]. `reach_s` is the largest [`Prefilter::reach_s`] of those that it may
+    /// change to.
     #[must_use]
-    pub fn new(robot: &RobotConfig, arm: &Arm, prefilter: &Prefilter) -> Self {
+    pub fn new(robot: &RobotConfig, arm: &Arm, prefilter: &Prefilter, reach_s: f32) -> Self {
         let config = &robot.limits;
         let mut joints = config.joints.map(|l| Highest::new(&l, 1_f32.to_radians()));
         if arm.kind() == ArmKind::Scara {
             joints[2] = Highest::new(&config.joints[2], 1.0);
         }
         let needed = config.boxes_needed();
-        let boxes_s = prefilter.boxes_s();
-        let mut longest = boxes_s.iter().map(|s| *s as f32);
-        let first_s = longest.next().filter(|_| needed >= 1).unwrap_or(0.0);
-        let second_s = longest.next().filter(|_| needed >= 2).unwrap_or(0.0);
-        let inverse = |s: f32| if s > 0.0 { 1.0 / s } else { 0.0 };
-        let mean_s = prefilter.centroid_s();
-        let furthest_s = mean_s.max(prefilter.length_s() - mean_s);
         Self {
             joints,
             path: Highest::new(&config.path, 1.0),
             axis: Highest::new(&config.axis, 1.0),
             arm: arm.bounds(),
-            boxes: Boxes {
-                first_s,
-                second_s,
-                per_first: inverse(first_s),
-                per_both: 2.0 * inverse(first_s * second_s),
-            },
+            boxes: Boxes::new(&BoxRange::of(&prefilter.boxes_s()), needed),
             // and two ticks that a setpoint is behind
-            reach_s: (furthest_s + 2.0 * TICK_S) as f32,
+            reach_s: reach_s.max(prefilter.reach_s() as f32) + 2.0 * TICK_S as f32,
             fastest_mm_s: robot.feed_limit_mm_s,
             is_set: *config != LimitsConfig::default(),
             boxes_needed: needed,
         }
+    }
+
+    /// The same while the prefilter may be any whose boxes are within a range.
+    #[must_use]
+    pub fn within(&self, range: &BoxRange) -> Self {
+        Self {
+            boxes: Boxes::new(range, self.boxes_needed),
+            ..self.clone()
+        }
+    }
+
+    /// The boxes of the one prefilter that these limits are for; those that no limit needs are 0.
+    #[must_use]
+    pub fn box_range(&self) -> BoxRange {
+        let both_s = [self.boxes.first_s, self.boxes.second_s];
+        BoxRange {
+            shortest_s: both_s,
+            longest_s: both_s,
+        }
+    }
+
+    /// Whether the prefilter has to do with the limits.
+    #[must_use]
+    pub const fn needs_boxes(&self) -> bool {
+        self.boxes_needed > 0
     }
 
     /// Whether anything is limited.

@@ -60,6 +60,37 @@
 //! [`Run`] keeps what is needed of the past, and chooses for each segment what is fastest:
 //! its full feed with a stop where one must be, or half of it and no stop.
 //!
+//! # Prefilters that follow the mode
+//! With a map of the mode, or a choice for each move, the prefilter changes. All of the above
+//! still holds, because the command never is anything but the mean of one raw path through one
+//! prefilter:
+//! - **At rest** the next filter is put at the point where everything stands: its window holds
+//!   nothing else.
+//! - **On the way** of a line the command passes over once both windows have seen nothing but
+//!   one even motion on it (see [`crate::changeover`]). Before that instant it is a mean through
+//!   the first filter; from it on, through the second one, of a raw path that has always been on
+//!   this line and goes on from where it is now. Both means agree there, with their derivatives,
+//!   but for a rounding of 2^-19 mm, which is faded out. So no window and no pair of instants of
+//!   the second filter reaches back before the line: [`Run`] begins anew on it.
+//! - **Held, slowed or hurried**, a motion is not even: the second filter is fed anew, and if the
+//!   line ends before it has seen enough, the next segment waits for the change at rest. An arc
+//!   keeps its filter until it has settled, since the change waits for that as well.
+//!
+//! Which prefilters a segment goes through is chosen after its duration, and from it. So its
+//! condition is required for all that they can be: the one in force before it, and those for
+//! every mode along it. Their boxes are within a [`BoxRange`]: each is as long as the settings
+//! say or a damped period, and of lengths that grow the n-th longest grows as well. Of the left
+//! sides above, `1/T1` and `1/(T1 T2)` fall with the boxes' lengths, and the loads grow with them:
+//! with the shortest boxes in the former and the longest in the latter (for the box that spreads
+//! a short arc again the shortest) they are at least those of each prefilter in the range. m is
+//! the largest that the map can make. What a corner asks for, the stop and the pairs of
+//! instants, is a matter of the prefilter in force there.
+//!
+//! Limits give boxes to prefilters that have too few, as smoothing: the same lengths to all of
+//! them, so that this goes for pure shapers too. One more box never leaves more of a mode, since V
+//! is a product over the stages and `|∫₀ᵀ e^{(ζω ± jω_d)(t − T)} dt| / T ≤ 1`: the automatic choice
+//! keeps its residual limit.
+//!
 //! # Never a stall
 //! Conditions only get easier as the duration grows, and hold in the limit: the region shrinks to
 //! the segment, over which the bounds are finite because the singularity margin has been
@@ -72,6 +103,7 @@
 //! # Hops
 //! A pick-and-place move is slowed down as a whole, by [`Limits::hop_slowdown`].
 
+mod box_range;
 mod config;
 mod course;
 mod feed;
@@ -79,6 +111,7 @@ mod hop;
 mod joint_move;
 mod run;
 
+pub use box_range::BoxRange;
 pub use config::{Bound, Limited, LimitsConfig, MotionLimits, Order, Part};
 pub use course::{Course, Region};
 pub use feed::{Limits, add_boxes};

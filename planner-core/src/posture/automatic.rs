@@ -302,7 +302,7 @@ impl fmt::Display for ShortestError {
 }
 
 impl Shortest {
-    /// The table for modes of these damping ratios.
+    /// The table for modes of these damping ratios and EI shapers that leave `v_tol`.
     ///
     /// Cost on a Cortex-M4F: some ten million instructions, once for a robot.
     ///
@@ -311,6 +311,7 @@ impl Shortest {
     pub fn new(
         modes: impl Iterator<Item = Mode> + Clone,
         config: &ShortestConfig,
+        v_tol: f32,
     ) -> Result<Self, ShortestError> {
         let one_hz = |damping| Mode {
             frequency_hz: 1.0,
@@ -323,10 +324,15 @@ impl Shortest {
         Requirement::new(&most, uncertainty, limit).map_err(ShortestError::Value)?;
         let mut all: Vec<(Kind, f32, f64), { Kind::ALL.len() }> = Vec::new();
         for kind in by_length(&Kind::ALL) {
-            let Some(length_s) = length_s(kind, &most) else {
+            let at = |mode| PrefilterConfig {
+                v_tol,
+                ..self::config(kind, mode)
+            };
+            let (least, most) = (at(&least), at(&most));
+            let Some(length_s) = length_s(&most) else {
                 continue;
             };
-            let reach = reach(kind, &least, limit).min(reach(kind, &most, limit)) as f32;
+            let reach = reach(&least, limit).min(reach(&most, limit)) as f32;
             // there is room for every kind
             let _ = all.push((kind, reach, length_s));
         }
@@ -360,6 +366,31 @@ impl Shortest {
         found.map_or(self.longest(), |(kind, _)| *kind)
     }
 
+    /// Keeps of the kinds those that will do, and the shortest in any case.
+    pub fn retain(&mut self, will_do: impl Fn(Kind) -> bool) {
+        let shortest = self.kind(0.0);
+        self.reach
+            .retain(|(kind, _)| *kind == shortest || will_do(*kind));
+    }
+
+    /// Every kind that is ever chosen.
+    pub fn kinds(&self) -> impl Iterator<Item = Kind> {
+        self.chosen().map(|(kind, _)| kind)
+    }
+
+    /// The same with how far each allows: further than all shorter ones.
+    fn chosen(&self) -> impl Iterator<Item = (Kind, f32)> {
+        let mut furthest = 0.0;
+        let all = self.reach.iter().copied();
+        all.filter(move |(_, reach)| {
+            let is_chosen = *reach > furthest && *reach >= self.config.uncertainty;
+            if is_chosen {
+                furthest = *reach;
+            }
+            is_chosen
+        })
+    }
+
     /// The one that allows for the most: none that is ever chosen is longer.
     #[must_use]
     pub fn longest(&self) -> Kind {
@@ -379,30 +410,28 @@ impl fmt::Display for Shortest {
             Percent(self.config.uncertainty.into()),
         )?;
         // longer ones, for moves that keep one prefilter while the mode changes
-        let mut furthest = 0.0;
-        for (kind, reach) in &self.reach {
-            if *reach > furthest && *reach >= self.config.uncertainty {
-                furthest = *reach;
-                write!(f, "; {} to {:.1} %", kind.name(), 100.0 * reach)?;
-            }
-        }
-        Ok(())
+        self.chosen()
+            .try_for_each(|(kind, reach)| write!(f, "; {} to {:.1} %", kind.name(), 100.0 * reach))
     }
 }
 
 /// How far the mode may be off, as a fraction, for no more than `limit` to be left of it: good
 /// to 0.03 %, and never too much but by what the residual does within a percent.
 #[inline(never)]
-fn reach(kind: Kind, nominal: &Mode, limit: f64) -> f64 {
+fn reach(config: &PrefilterConfig, limit: f64) -> f64 {
     let mut prefilter = Prefilter::NONE;
-    if prefilter.set(&config(kind, nominal)).is_err() {
+    if prefilter.set(config).is_err() {
         return -1.0;
     }
+    let nominal = Mode {
+        frequency_hz: config.frequency_hz.into(),
+        damping: config.damping.into(),
+    };
     let keeps = |off: f64| {
         [1.0 - off, 1.0 + off].into_iter().all(|ratio| {
             let mode = Mode {
                 frequency_hz: nominal.frequency_hz * ratio,
-                ..*nominal
+                ..nominal
             };
             residual(&prefilter, &mode) <= limit + MARGIN
         })
@@ -461,11 +490,11 @@ fn config(kind: Kind, mode: &Mode) -> PrefilterConfig {
     }
 }
 
-/// The length in seconds of a kind for a mode, if it can be made.
+/// The length in seconds of a prefilter, if it can be made.
 #[inline(never)]
-fn length_s(kind: Kind, mode: &Mode) -> Option<f64> {
+fn length_s(config: &PrefilterConfig) -> Option<f64> {
     let mut prefilter = Prefilter::NONE;
-    prefilter.set(&config(kind, mode)).ok()?;
+    prefilter.set(config).ok()?;
     Some(prefilter.length_s())
 }
 

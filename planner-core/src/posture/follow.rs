@@ -7,6 +7,7 @@ use super::course::{Course, between};
 use super::map::{MapError, ModeMap, ModeMapConfig};
 use super::method::Method;
 use super::zeros::Zeros;
+use crate::limits::BoxRange;
 use crate::path::PathSegment;
 use crate::prefilter::{
     HALF_SLOTS, Kernel, Kind, Mode, Prefilter, PrefilterConfig, PrefilterError, Stage,
@@ -205,6 +206,8 @@ pub struct ShortestConfig {
 pub struct Follower {
     map: ModeMap,
     source: Source,
+    /// The largest reach of its prefilters in s: see [`Prefilter::reach_s`].
+    reach_s: f32,
 }
 
 /// Ticks that a change-over takes beside the filters' windows: a segment begins and ends
@@ -226,15 +229,18 @@ impl Follower {
         let shortest = match (config.method, config.shortest) {
             (PostureMethod::Local, Some(shortest)) => {
                 let modes = config.map.used().iter().map(Mode::from);
-                let found = Shortest::new(modes, &shortest);
+                let found = Shortest::new(modes, &shortest, config.prefilter.v_tol);
                 Some(found.map_err(FollowError::Shortest)?)
             }
             _ => None,
         };
         Self::put(place, config, shortest)?;
-        place
-            .as_ref()
-            .map_or(Ok(()), |follower| check_length(&follower.slowest()))
+        if let Some(follower) = place {
+            follower.leave_out_too_long();
+            check_length(&follower.slowest())?;
+            follower.reach_s = follower.longest_reach_s();
+        }
+        Ok(())
     }
 
     #[inline(never)]
@@ -252,6 +258,7 @@ impl Follower {
                 }
                 (method, _) => Source::Boxes(method),
             },
+            reach_s: 0.0,
         });
         Ok(())
     }
@@ -266,6 +273,73 @@ impl Follower {
                 named(&of_kind(config, shortest.longest()), &mode)
             }
             Source::Boxes(_) => Tuning::Boxes([mode.frequency_hz; 2]),
+        }
+    }
+
+    /// Leaves kinds out of the choice that would be too long for the slowest mode.
+    fn leave_out_too_long(&mut self) {
+        let mode = self.map.slowest();
+        if let Source::Shortest(shortest, config) = &mut self.source {
+            shortest.retain(|kind| check_length(&named(&of_kind(config, kind), &mode)).is_ok());
+        }
+    }
+
+    /// The largest [`Prefilter::reach_s`] of the prefilters that a move can get.
+    #[must_use]
+    pub const fn reach_s(&self) -> f32 {
+        self.reach_s
+    }
+
+    /// `T_h − m` is largest with the most damping, `m` with the least.
+    fn longest_reach_s(&self) -> f32 {
+        let most = self.map.slowest();
+        let none = Mode {
+            damping: 0.0,
+            ..most
+        };
+        let mut longest_s = 0.0_f64;
+        for mode in [most, none] {
+            self.each_tuning(&mode, |tuning| longest_s = longest_s.max(reach_s(tuning)));
+        }
+        longest_s as f32
+    }
+
+    /// Adds to a range the boxes of every prefilter that a move along a course can get.
+    ///
+    /// Every box of a prefilter is a damped period long, or as long as the settings say: the
+    /// n-th longest one grows with the period as well.
+    #[inline(never)]
+    pub fn add_boxes(&self, range: &mut BoxRange, course: &Course) {
+        let (one, other) = (course.start, course.end);
+        let slowest = Mode {
+            frequency_hz: one.frequency_hz.min(other.frequency_hz),
+            damping: one.damping.max(other.damping),
+        };
+        let fastest = Mode {
+            frequency_hz: one.frequency_hz.max(other.frequency_hz),
+            damping: one.damping.min(other.damping),
+        };
+        for mode in [slowest, fastest] {
+            self.each_tuning(&mode, |tuning| match tuning {
+                Tuning::Named(config) => range.add(&Prefilter::boxes_of(config)),
+                Tuning::Boxes(zeros_hz) => range.add(&zeros_hz.map(|zero_hz| 1.0 / zero_hz)),
+            });
+        }
+    }
+
+    /// Every kind of tuning that a move can get, for the map's slowest mode.
+    pub(crate) fn each_slowest(&self, take: impl FnMut(&Tuning)) {
+        self.each_tuning(&self.map.slowest(), take);
+    }
+
+    /// The same for a mode.
+    fn each_tuning(&self, mode: &Mode, mut take: impl FnMut(&Tuning)) {
+        match &self.source {
+            Source::Named(config) => take(&named(config, mode)),
+            Source::Shortest(shortest, config) => shortest
+                .kinds()
+                .for_each(|kind| take(&named(&of_kind(config, kind), mode))),
+            Source::Boxes(_) => take(&Tuning::Boxes([mode.frequency_hz; 2])),
         }
     }
 
@@ -451,9 +525,14 @@ fn named(config: &PrefilterConfig, mode: &Mode) -> Tuning {
     })
 }
 
-/// The same settings with another kind.
+/// The same settings with another kind, as [`Shortest`] knows it: its boxes are a period long.
 fn of_kind(config: &PrefilterConfig, kind: Kind) -> PrefilterConfig {
-    PrefilterConfig { kind, ..*config }
+    PrefilterConfig {
+        kind,
+        box_ms: 0.0,
+        s_curve_jerk_mm_s3: 0.0,
+        ..*config
+    }
 }
 
 /// How long a raw path has to be for the change between two prefilters on its way: both windows
@@ -468,6 +547,14 @@ fn change_over_s(start: &Tuning, end: &Tuning, after_arc: bool) -> f64 {
     windows + libm::fabs(d - a) + SLACK_TICKS * TICK_S
 }
 
+/// The [`Prefilter::reach_s`] of a tuning; 0 if it cannot be made.
+#[inline(never)]
+fn reach_s(tuning: &Tuning) -> f64 {
+    let mut prefilter = Prefilter::NONE;
+    let made = tuning.make(&mut prefilter);
+    made.map_or(0.0, |()| prefilter.reach_s())
+}
+
 /// How long the prefilter of a tuning is; without end if it cannot be made.
 #[inline(never)]
 fn length_s(tuning: &Tuning) -> f64 {
@@ -475,5 +562,153 @@ fn length_s(tuning: &Tuning) -> f64 {
     match tuning.make(&mut prefilter) {
         Ok(()) => prefilter.length_s(),
         Err(_) => f64::INFINITY,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::posture::MapNode;
+    use crate::prefilter::{SecondMode, residual};
+
+    /// 20 Hz at one end, 8 Hz at the other.
+    fn course() -> Course {
+        let mode = |frequency_hz| Mode {
+            frequency_hz,
+            damping: 0.02,
+        };
+        Course {
+            start: mode(20.0),
+            end: mode(8.0),
+            length_mm: 150.0,
+        }
+    }
+
+    fn follower(prefilter: PrefilterConfig, shortest: Option<ShortestConfig>) -> Follower {
+        let map = ModeMapConfig::constant(MapNode::new(8.0, 0.02));
+        let mut place = None;
+        let config = FollowConfig {
+            map: &map,
+            prefilter,
+            shortest,
+            method: PostureMethod::Local,
+        };
+        Follower::make(&mut place, &config).unwrap();
+        place.unwrap()
+    }
+
+    fn tunings(follower: &Follower, from_rest: bool) -> [PrefilterConfig; 2] {
+        let step = MoveToFollow {
+            course: course(),
+            duration_s: 1.0,
+            from_rest,
+            is_line: true,
+            after_arc: false,
+        };
+        let MoveTunings { start, end } = follower.tunings(&step, &follower.slowest());
+        [start, end].map(|tuning| match tuning {
+            Tuning::Named(config) => config,
+            Tuning::Boxes(_) => panic!("named prefilters are asked for"),
+        })
+    }
+
+    fn left(config: &PrefilterConfig, frequency_hz: f32, damping: f32) -> f64 {
+        let mode = Mode {
+            frequency_hz: frequency_hz.into(),
+            damping: damping.into(),
+        };
+        residual(&Prefilter::new(config).unwrap(), &mode)
+    }
+
+    #[test]
+    fn prefilters_of_a_move_keep_second_mode_residual_allowed_and_smoothing() {
+        const SECOND_HZ: f32 = 36.6;
+        let plain = PrefilterConfig {
+            kind: Kind::Ei,
+            v_tol: 0.2,
+            ..PrefilterConfig::DEFAULT
+        };
+        let second = SecondMode {
+            kind: Kind::Zv,
+            frequency_hz: SECOND_HZ,
+            damping: 0.03,
+        };
+        let both = PrefilterConfig { second, ..plain };
+        let smooth = PrefilterConfig {
+            smoothing_ms: [30.0, 12.0],
+            ..plain
+        };
+        for from_rest in [false, true] {
+            for config in tunings(&follower(plain, None), from_rest) {
+                let allowed = left(&config, config.frequency_hz, config.damping);
+                assert!((allowed - 0.2).abs() < 1e-6, "{allowed}");
+                assert!(left(&config, SECOND_HZ, 0.03) > 0.2, "{config:?}");
+            }
+            for config in tunings(&follower(both, None), from_rest) {
+                assert!(left(&config, config.frequency_hz, config.damping) < 0.2);
+                assert!(left(&config, SECOND_HZ, 0.03) < 1e-6, "{config:?}");
+            }
+            for config in tunings(&follower(smooth, None), from_rest) {
+                assert_eq!(Prefilter::new(&config).unwrap().boxes_s(), [0.03, 0.012]);
+            }
+        }
+    }
+
+    #[test]
+    fn the_automatic_choice_leaves_no_more_than_its_limit_whatever_else_is_set() {
+        let config = PrefilterConfig {
+            v_tol: 0.2,
+            box_ms: 11.0,
+            s_curve_jerk_mm_s3: 1e6,
+            smoothing_ms: [30.0, 12.0],
+            ..PrefilterConfig::DEFAULT
+        };
+        for (uncertainty, limit) in [(0.02, 0.05), (0.1, 0.05), (0.2, 0.1), (0.25, 0.02)] {
+            let shortest = ShortestConfig { uncertainty, limit };
+            let follower = follower(config, Some(shortest));
+            for config in tunings(&follower, true) {
+                for off in [-uncertainty, 0.0, uncertainty] {
+                    let met_hz = config.frequency_hz * (1.0 + off);
+                    let left = left(&config, met_hz, config.damping);
+                    assert!(left <= f64::from(limit) + 1e-3, "{left}, {config:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn all_boxes_that_a_move_can_get_are_in_the_range() {
+        let zv = PrefilterConfig {
+            kind: Kind::Zv,
+            smoothing_ms: [30.0, 12.0],
+            ..PrefilterConfig::DEFAULT
+        };
+        let fir = PrefilterConfig {
+            kind: Kind::FirZv,
+            ..zv
+        };
+        let range_of = |follower: &Follower| {
+            let mut range = BoxRange::of(&[0.06, 0.02]);
+            follower.add_boxes(&mut range, &course());
+            range
+        };
+        let damped = |hz: f32| 1.0 / (hz * libm::sqrtf(1.0 - 0.02 * 0.02));
+        let near = |found: [f32; 2], expected: [f32; 2]| {
+            let close = |(one, other): (f32, f32)| (one - other).abs() < 1e-6;
+            assert!(found.into_iter().zip(expected).all(close), "{found:?}");
+        };
+        let range = range_of(&follower(zv, None));
+        near(range.shortest_s, [0.03, 0.012]);
+        near(range.longest_s, [0.06, 0.02]);
+        let range = range_of(&follower(fir, None));
+        near(range.shortest_s, [damped(20.0), 0.012]);
+        near(range.longest_s, [damped(8.0), 0.02]);
+        // pure shapers for small uncertainties, a box besides for moves on which the mode changes
+        let shortest = ShortestConfig {
+            uncertainty: 0.02,
+            limit: 0.05,
+        };
+        let range = range_of(&follower(fir, Some(shortest)));
+        near(range.shortest_s, [0.03, 0.012]);
     }
 }

@@ -91,25 +91,25 @@ impl Prefilter {
     #[inline(never)]
     pub(crate) fn set(&mut self, config: &PrefilterConfig) -> Result<(), PrefilterError> {
         config.check()?;
-        let mode = |frequency_hz: f32, damping: f32| Mode {
-            frequency_hz: frequency_hz.into(),
-            damping: damping.into(),
-        };
-        let first = mode(config.frequency_hz, config.damping);
-        let second = (config.second.frequency_hz > 0.0).then(|| {
-            let SecondMode {
-                kind,
-                frequency_hz,
-                damping,
-            } = config.second;
-            (kind, mode(frequency_hz, damping))
-        });
-        let parts = || core::iter::once((config.kind, first)).chain(second);
         self.stages.clear();
-        for (kind, mode) in parts() {
+        for (kind, mode) in parts(config) {
             self.push_shaper(config, kind, &mode);
         }
-        for (kind, mode) in parts() {
+        self.push_all_boxes(config)
+    }
+
+    /// The lengths of the boxes of the prefilter that the settings describe, as
+    /// [`Prefilter::boxes_s`]; none if they are out of range. Shapers cost most of a prefilter:
+    /// they are not made.
+    #[inline(never)]
+    pub(crate) fn boxes_of(config: &PrefilterConfig) -> Vec<f64, MAX_STAGES> {
+        let mut prefilter = Self::NONE;
+        let made = prefilter.push_all_boxes(config);
+        made.map(|()| prefilter.boxes_s()).unwrap_or_default()
+    }
+
+    fn push_all_boxes(&mut self, config: &PrefilterConfig) -> Result<(), PrefilterError> {
+        for (kind, mode) in parts(config) {
             self.push_boxes(config, kind, &mode)?;
         }
         let in_seconds = |length_ms| f64::from(length_ms) / 1e3;
@@ -208,15 +208,6 @@ impl Prefilter {
         }
     }
 
-    /// Adds a box of `length_s`, the shorter boxes before the longer ones, unless there are
-    /// [`MAX_STAGES`].
-    pub fn add_box(&mut self, length_s: f64) {
-        let is_longer = |stage: &Stage| matches!(stage, Stage::Box(other) if *other > length_s);
-        let place = self.stages.iter().position(is_longer);
-        let place = place.unwrap_or(self.stages.len());
-        let _ = self.stages.insert(place, Stage::Box(length_s));
-    }
-
     /// The stages in the order in which they filter.
     #[must_use]
     pub fn stages(&self) -> &[Stage] {
@@ -240,6 +231,14 @@ impl Prefilter {
     #[must_use]
     pub fn reversed_response(&self) -> Response {
         Response::new(&self.stages, true)
+    }
+
+    /// How far the output can be from a point of the input's window, in s of travel: `m` or
+    /// `T_h − m`, whichever is longer.
+    #[must_use]
+    pub fn reach_s(&self) -> f64 {
+        let mean_s = self.centroid_s();
+        mean_s.max(self.length_s() - mean_s)
     }
 
     /// The lengths of the boxes in seconds, the longest first; none in a pure shaper.
@@ -280,6 +279,22 @@ impl Prefilter {
     pub fn spread_s(&self) -> f64 {
         libm::sqrt(self.stages.iter().map(Stage::variance_s2).sum())
     }
+}
+
+/// The kind for each mode that the settings name.
+fn parts(config: &PrefilterConfig) -> impl Iterator<Item = (Kind, Mode)> {
+    let mode = |frequency_hz: f32, damping: f32| Mode {
+        frequency_hz: frequency_hz.into(),
+        damping: damping.into(),
+    };
+    let first = (config.kind, mode(config.frequency_hz, config.damping));
+    let SecondMode {
+        kind,
+        frequency_hz,
+        damping,
+    } = config.second;
+    let second = (frequency_hz > 0.0).then(|| (kind, mode(frequency_hz, damping)));
+    core::iter::once(first).chain(second)
 }
 
 /// `T_rr = √(F/J)`, the boxes of an S-curve that reaches a feedrate `F` with a jerk `J`
