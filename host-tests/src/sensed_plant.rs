@@ -1,11 +1,13 @@
 //! The full plant with an accelerometer on its tool: what answers the setpoints on the other end
-//! of the controller's second port.
+//! of the controller's second port, the accelerometer or the drives.
 
 use std::collections::VecDeque;
 
 use planner_core::accelerometer::SampleFrame;
+use planner_core::following_error::FollowingErrorFrame;
 use planner_core::motion::MotionState;
-use planner_core::telemetry::SetpointFrame;
+use planner_core::pose::JointUnit;
+use planner_core::telemetry::{SetpointFrame, Wanted};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -21,6 +23,26 @@ const LONGEST_TICKS: usize = 60_000;
 /// Lost frames in a row that the plant bridges; more are a controller that started again.
 const LONGEST_GAP: u32 = 100;
 
+/// What comes back for a setpoint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Answer {
+    /// What the accelerometer reads.
+    Acceleration(SampleFrame),
+    /// What the drives tell.
+    FollowingErrors(FollowingErrorFrame),
+}
+
+impl Answer {
+    /// The bytes on the wire.
+    #[must_use]
+    pub fn encode(&self) -> Vec<u8> {
+        match self {
+            Self::Acceleration(frame) => frame.encode().to_vec(),
+            Self::FollowingErrors(frame) => frame.encode().to_vec(),
+        }
+    }
+}
+
 /// Full plant and accelerometer.
 #[derive(Debug)]
 pub struct SensedPlant {
@@ -31,7 +53,7 @@ pub struct SensedPlant {
     /// Ticks that an answer takes.
     delay: usize,
     /// Answers with the ticks until they arrive.
-    under_way: VecDeque<(usize, SampleFrame)>,
+    under_way: VecDeque<(usize, Answer)>,
     /// The tool's acceleration along X and Y in each tick since the last stop, in mm/s².
     felt_mm_s2: Vec<[f64; 2]>,
     was_moving: bool,
@@ -56,8 +78,8 @@ impl SensedPlant {
         }
     }
 
-    /// Carries out a setpoint; yields the answer of the accelerometer that arrives then.
-    pub fn answer(&mut self, frame: &SetpointFrame) -> Option<SampleFrame> {
+    /// Carries out a setpoint; yields the answer that arrives then.
+    pub fn answer(&mut self, frame: &SetpointFrame) -> Option<Answer> {
         let setpoint = &frame.setpoint;
         let target = JointSetpoint {
             position: joints(setpoint),
@@ -96,20 +118,36 @@ impl SensedPlant {
         for (wait, _) in &mut self.under_way {
             *wait = wait.saturating_sub(1);
         }
-        if frame.listening {
-            let mut noisy = |value: f64| value + NOISE_MM_S2 * self.rng.random_range(-1.0..=1.0);
-            self.under_way.push_back((
-                self.delay,
-                SampleFrame {
-                    sequence: frame.sequence,
-                    acceleration_mm_s2: felt
-                        .tool_acceleration_mm_s2
-                        .map(|value| noisy(value) as f32),
-                },
-            ));
-        }
-        let (_, sample) = self.under_way.pop_front_if(|(wait, _)| *wait == 0)?;
-        Some(sample)
+        let sequence = frame.sequence;
+        let answer = match frame.wanted {
+            Wanted::Nothing => None,
+            Wanted::Acceleration => {
+                let mut noisy =
+                    |value: f64| value + NOISE_MM_S2 * self.rng.random_range(-1.0..=1.0);
+                let acceleration_mm_s2 = felt
+                    .tool_acceleration_mm_s2
+                    .map(|value| noisy(value) as f32);
+                Some(Answer::Acceleration(SampleFrame {
+                    sequence,
+                    acceleration_mm_s2,
+                }))
+            }
+            Wanted::FollowingErrors => Some(Answer::FollowingErrors(FollowingErrorFrame {
+                sequence,
+                error: std::array::from_fn(|joint| {
+                    // rad to µrad, or mm to µm
+                    let fine = match setpoint.arm.joint_units()[joint] {
+                        JointUnit::Angle => 1e6,
+                        JointUnit::Length => 1e3,
+                    };
+                    (fine * felt.following_error[joint]) as f32
+                }),
+            })),
+        };
+        self.under_way
+            .extend(answer.map(|answer| (self.delay, answer)));
+        let (_, answer) = self.under_way.pop_front_if(|(wait, _)| *wait == 0)?;
+        Some(answer)
     }
 
     /// Ticks since the last stop, up to a minute of them.

@@ -40,7 +40,7 @@ pub struct SerialLoop<'q> {
     pub arm: Option<SwitchedArm>,
     /// What absolute encoders read, if there are any.
     pub encoders: Option<JointPosition>,
-    /// A plant on the second port, whose accelerometer answers the setpoints.
+    /// A plant on the second port, whose accelerometer and drives answer the setpoints.
     pub plant: Option<SensedPlant>,
     listener: Listener,
     /// Whether what is to be kept is kept.
@@ -130,12 +130,25 @@ impl SerialLoop<'_> {
         })
     }
 
-    /// The state that a status report shows now.
+    /// Asks for a status report (`?` or 0x87). It comes at once, or with the next tick if orders
+    /// are under way.
+    pub fn ask_status(&mut self, byte: u8) {
+        let before = self.output.len();
+        self.send(&[byte]);
+        if !self.output[before..].contains(&b'<') {
+            self.tick();
+        }
+    }
+
+    /// The state that a status report shows.
     pub fn state(&mut self) -> String {
-        let heard = std::mem::take(&mut self.output);
-        self.send(b"?");
-        let report =
-            String::from_utf8_lossy(&std::mem::replace(&mut self.output, heard)).into_owned();
+        let mut heard = std::mem::take(&mut self.output);
+        self.ask_status(b'?');
+        let report = String::from_utf8_lossy(&self.output).into_owned();
+        let is_other = |line: &&str| !line.starts_with('<');
+        let others = report.split_inclusive('\n').filter(is_other);
+        heard.extend(others.flat_map(str::bytes));
+        self.output = heard;
         let start = report.rfind('<').map_or(0, |start| start + 1);
         let end = report[start..].find('|').unwrap_or(0);
         report[start..start + end].to_string()
@@ -207,11 +220,11 @@ impl SerialLoop<'_> {
             let frame = SetpointFrame {
                 sequence: self.report.health.ticks,
                 setpoint,
-                listening: self.listener.is_busy(),
+                wanted: self.listener.wants(self.report.health.ticks),
                 ..SetpointFrame::default()
             };
-            if let Some(sample) = plant.answer(&frame) {
-                self.listener.hear(&sample.encode());
+            if let Some(answer) = plant.answer(&frame) {
+                self.listener.hear(&answer.encode());
             }
         }
         self.report = Report {

@@ -116,7 +116,7 @@ fn one_firmware_is_either_robot() {
         let heard = desk.ask("G0 X0 Y0 Z-767");
         assert!(heard.contains("ok"), "{heard}");
         assert!(desk.ask("$report-joints=1").contains("ok"));
-        desk.send(b"?");
+        desk.ask_status(b'?');
         let heard = desk.heard();
         // radians, all four
         assert!(heard.contains("|J:0.3719,0.3719,0.3719,0.0000|"), "{heard}");

@@ -11,6 +11,8 @@ mod chords;
 pub mod config;
 pub mod corner;
 mod dense;
+pub mod following_error;
+pub mod framing;
 pub mod gcode;
 pub mod hop;
 pub mod identify;

@@ -3,15 +3,13 @@
 //! A frame that is **placed** says where the joints are, and not where to go: a drive takes its
 //! position as the one it has, and does not move. The others a drive follows.
 //!
-//! A frame is 78 bytes, little endian, followed by their CRC-32 (ISO-HDLC), the
-//! whole COBS-coded and closed by a zero byte: 84 bytes on the wire, 840 kBd at
-//! 1 kHz. A receiver that starts in the middle, or that loses bytes, is in step
-//! again at the next zero.
+//! A frame is 78 bytes, little endian, and as [`crate::framing`] has it 84 bytes on the wire,
+//! 840 kBd at 1 kHz.
 //!
 //! | offset | field | |
 //! |---|---|---|
 //! | 0 | sequence | u32, one more each tick |
-//! | 4 | state | u8, 0 idle, 1 running, 2 stopping, 3 held, 4 paused; bit 5: samples wanted; bit 6: a delta's joints; bit 7: placed |
+//! | 4 | state | u8, 0 idle, 1 running, 2 stopping, 3 held, 4 paused; bit 4: following errors wanted; bit 5: accelerations wanted; bit 6: a delta's joints; bit 7: placed |
 //! | 5 | pose | 4 × i32, raw bits of X, Y, Z (2^-19 mm) and C (2^-19 °) |
 //! | 21 | joint position | 4 × i32, raw bits (2^-26 rad; a SCARA's joint 3 2^-19 mm) |
 //! | 37 | joint velocity | 4 × f32, rad/s and mm/s |
@@ -20,6 +18,7 @@
 //! | 73 | overruns | u32, control periods missed since the start |
 //! | 77 | outputs | u8, bit 0 gripper, bit 1 blow-off |
 
+use crate::framing::{self, Decoder};
 use crate::kinematics::ArmKind;
 use crate::motion::{MotionState, Setpoint};
 use crate::pose::{JointPosition, JointState, Pose};
@@ -27,11 +26,8 @@ use crate::pose::{JointPosition, JointState, Pose};
 /// Bytes of a frame before the CRC.
 const BODY_BYTES: usize = 78;
 
-/// Bytes of a frame with its CRC, before COBS.
-const CHECKED_BYTES: usize = BODY_BYTES + 4;
-
 /// Bytes of a frame on the wire, the closing zero included.
-pub const FRAME_BYTES: usize = cobs::max_encoding_length(CHECKED_BYTES) + 1;
+pub const FRAME_BYTES: usize = framing::wire_bytes(BODY_BYTES);
 
 /// Marks a position that was set, in the byte of the state.
 const PLACED: u8 = 1 << 7;
@@ -39,10 +35,40 @@ const PLACED: u8 = 1 << 7;
 /// Marks the joints of a delta, likewise.
 const DELTA: u8 = 1 << 6;
 
-/// Marks a frame that the accelerometer has to answer ([`crate::accelerometer`]).
-const LISTENING: u8 = 1 << 5;
+/// What has to be answered to a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wanted {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// The drives' following errors ([`crate::following_error`]).
+    FollowingErrors,
+    /// What the accelerometer reads ([`crate::accelerometer`]).
+    Acceleration,
+}
 
-const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+impl Wanted {
+    /// The bits of the state's byte that tell it.
+    const MASK: u8 = 1 << 4 | 1 << 5;
+
+    /// As it is among the bits of the state's byte.
+    #[must_use]
+    pub const fn to_bits(self) -> u8 {
+        match self {
+            Self::Nothing => 0,
+            Self::FollowingErrors => 1 << 4,
+            Self::Acceleration => 1 << 5,
+        }
+    }
+
+    /// The inverse of [`Wanted::to_bits`], whatever the other bits are; none if both are wanted.
+    #[must_use]
+    pub fn from_bits(bits: u8) -> Option<Self> {
+        let all = [Self::Nothing, Self::FollowingErrors, Self::Acceleration];
+        all.into_iter()
+            .find(|wanted| wanted.to_bits() == bits & Self::MASK)
+    }
+}
 
 /// One control tick, as it leaves the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -55,22 +81,15 @@ pub struct SetpointFrame {
     pub tick_cost: u32,
     /// Control periods missed since the start.
     pub overruns: u32,
-    /// Whether the accelerometer has to answer with a sample.
-    pub listening: bool,
+    /// What has to be answered.
+    pub wanted: Wanted,
 }
 
 impl SetpointFrame {
     /// The frame as it goes on the wire.
     #[must_use]
     pub fn encode(&self) -> [u8; FRAME_BYTES] {
-        let mut checked = [0; CHECKED_BYTES];
-        checked[..BODY_BYTES].copy_from_slice(&self.body());
-        let crc = CRC.checksum(&checked[..BODY_BYTES]);
-        checked[BODY_BYTES..].copy_from_slice(&crc.to_le_bytes());
-        // COBS leaves no zero inside, so the byte that stays zero here closes the frame.
-        let mut wire = [0; FRAME_BYTES];
-        cobs::encode(&checked, &mut wire);
-        wire
+        framing::encode(&self.body())
     }
 
     fn body(&self) -> [u8; BODY_BYTES] {
@@ -83,9 +102,8 @@ impl SetpointFrame {
             ArmKind::Scara => 0,
             ArmKind::Delta => DELTA,
         };
-        let listening = if self.listening { LISTENING } else { 0 };
         let state = state_to_byte(self.setpoint.state);
-        put(&mut rest, [state | delta | placed | listening]);
+        put(&mut rest, [state | delta | placed | self.wanted.to_bits()]);
         for bits in self.setpoint.pose.to_bits() {
             put(&mut rest, bits.to_le_bytes());
         }
@@ -128,13 +146,13 @@ impl SetpointFrame {
                 } else {
                     ArmKind::Delta
                 },
-                state: state_from_byte(state & !(PLACED | DELTA | LISTENING))?,
+                state: state_from_byte(state & !(PLACED | DELTA | Wanted::MASK))?,
                 placed: state & PLACED != 0,
                 outputs,
             },
             tick_cost,
             overruns,
-            listening: state & LISTENING != 0,
+            wanted: Wanted::from_bits(state)?,
         })
     }
 }
@@ -182,8 +200,7 @@ fn state_from_byte(byte: u8) -> Option<MotionState> {
 /// Finds the frames in a stream of bytes, whatever happened to it on the way.
 #[derive(Debug, Default)]
 pub struct FrameDecoder {
-    /// Bytes since the last zero; `None` once they are too many for a frame.
-    pending: Option<heapless::Vec<u8, FRAME_BYTES>>,
+    decoder: Decoder<FRAME_BYTES>,
     last_sequence: Option<u32>,
     lost: u32,
     bad: u32,
@@ -194,7 +211,7 @@ impl FrameDecoder {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            pending: Some(heapless::Vec::new()),
+            decoder: Decoder::new(),
             last_sequence: None,
             lost: 0,
             bad: 0,
@@ -220,19 +237,9 @@ impl FrameDecoder {
     }
 
     fn push(&mut self, byte: u8) -> Option<SetpointFrame> {
-        if byte != 0 {
-            if let Some(bytes) = &mut self.pending
-                && bytes.push(byte).is_err()
-            {
-                self.pending = None;
-            }
-            return None;
-        }
-        let pending = self.pending.replace(heapless::Vec::new());
-        if pending.as_ref().is_some_and(|bytes| bytes.is_empty()) {
-            return None;
-        }
-        let Some(frame) = pending.and_then(|bytes| decode(&bytes)) else {
+        let body = self.decoder.push(byte)?.ok();
+        let frame = body.and_then(|body| body.try_into().ok());
+        let Some(frame) = frame.and_then(SetpointFrame::from_body) else {
             self.bad = self.bad.saturating_add(1);
             return None;
         };
@@ -245,20 +252,6 @@ impl FrameDecoder {
         self.last_sequence = Some(frame.sequence);
         Some(frame)
     }
-}
-
-/// The frame in the bytes between two zeros.
-fn decode(wire: &[u8]) -> Option<SetpointFrame> {
-    let mut checked = [0; FRAME_BYTES];
-    let length = cobs::decode(wire, &mut checked).ok()?.frame_size();
-    let (body, crc) = checked
-        .get(..length)?
-        .split_first_chunk::<BODY_BYTES>()
-        .filter(|(_, crc)| crc.len() == CHECKED_BYTES - BODY_BYTES)?;
-    if CRC.checksum(body).to_le_bytes() != crc {
-        return None;
-    }
-    SetpointFrame::from_body(body)
 }
 
 #[cfg(test)]
@@ -285,7 +278,7 @@ mod tests {
             },
             tick_cost: 1999,
             overruns: 3,
-            listening: true,
+            wanted: Wanted::Acceleration,
         }
     }
 
@@ -303,10 +296,7 @@ mod tests {
         assert_eq!(wire.len(), 84);
         // 78 zeros are 78 codes of 1; then the CRC behind its code, and the end.
         assert!(wire[..78].iter().all(|&code| code == 1));
-        let crc = CRC.checksum(&[0; BODY_BYTES]).to_le_bytes();
-        assert_eq!(wire[78], 5);
-        assert_eq!(wire[79..83], crc);
-        assert_eq!(wire[83], 0);
+        assert_eq!((wire[78], wire[83]), (5, 0));
     }
 
     #[test]
@@ -357,7 +347,7 @@ mod tests {
         fn every_frame_survives(
             sequence: u32, pose: [i32; 4], position: [i32; 4], velocity: [u32; 4],
             acceleration: [u32; 4], tick_cost: u32, overruns: u32, state: u8, outputs: u8, placed: bool,
-            is_delta: bool, listening: bool,
+            is_delta: bool, wanted in 0_usize..3,
         ) {
             let sent = SetpointFrame {
                 sequence,
@@ -379,7 +369,7 @@ mod tests {
                 },
                 tick_cost,
                 overruns,
-                listening,
+                wanted: [Wanted::Nothing, Wanted::FollowingErrors, Wanted::Acceleration][wanted],
             };
             let wire = sent.encode();
             prop_assert_eq!(wire.iter().filter(|&&byte| byte == 0).count(), 1);

@@ -95,7 +95,7 @@ pub async fn run(
             setpoint,
             tick_cost,
             overruns: report.health.overruns,
-            listening: link.is_listening(),
+            wanted: link.wanted(),
         };
         if frames.try_send(frame).is_err() {
             report.health.unsent = report.health.unsent.saturating_add(1);

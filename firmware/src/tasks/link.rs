@@ -10,6 +10,7 @@ use embassy_sync::mutex::{self, MutexGuard};
 use planner_core::identify::Listener;
 use planner_core::motion::{self, MotionSettings};
 use planner_core::protocol::Report;
+use planner_core::telemetry::Wanted;
 
 /// What the command task asks of the control task. Obeyed in order, before the next tick.
 pub enum Order {
@@ -30,7 +31,8 @@ pub struct Link {
     report: Mutex<CriticalSectionRawMutex, Cell<Report>>,
     program_open: AtomicBool,
     inputs_inverted: AtomicU8,
-    listening: AtomicBool,
+    /// Bits of [`Wanted`].
+    wanted: AtomicU8,
     listener: mutex::Mutex<CriticalSectionRawMutex, Listener>,
 }
 
@@ -45,7 +47,7 @@ impl Default for Link {
             report: Mutex::new(Cell::default()),
             program_open: AtomicBool::new(false),
             inputs_inverted: AtomicU8::new(0),
-            listening: AtomicBool::new(false),
+            wanted: AtomicU8::new(0),
             listener: mutex::Mutex::new(Listener::new()),
         }
     }
@@ -78,17 +80,19 @@ impl Link {
         self.inputs_inverted.store(bits, Ordering::Relaxed);
     }
 
-    /// Command task: the last tick's report, with what the accelerometer has said so far.
+    /// Command task: the last tick's report, with how far the record has come.
     pub async fn report(&self) -> Report {
-        let listener = self.listener().await;
-        self.listening.store(listener.is_busy(), Ordering::Relaxed);
+        let mut listener = self.listener().await;
+        let report = self.report.lock(Cell::get);
+        let wanted = listener.wants(report.health.ticks);
+        self.wanted.store(wanted.to_bits(), Ordering::Relaxed);
         Report {
             listening: listener.progress(),
-            ..self.report.lock(Cell::get)
+            ..report
         }
     }
 
-    /// Sample task and command task: the accelerometer's record. While one has it the other
+    /// Sample task and command task: the record. While one has it the other
     /// waits, and interrupts do not.
     pub async fn listener(&self) -> MutexGuard<'_, CriticalSectionRawMutex, Listener> {
         self.listener.lock().await
@@ -115,9 +119,9 @@ impl Link {
         self.inputs_inverted.load(Ordering::Relaxed)
     }
 
-    /// Control task: whether the accelerometer's samples are wanted.
-    pub fn is_listening(&self) -> bool {
-        self.listening.load(Ordering::Relaxed)
+    /// Control task: what has to be answered to the setpoint.
+    pub fn wanted(&self) -> Wanted {
+        Wanted::from_bits(self.wanted.load(Ordering::Relaxed)).unwrap_or_default()
     }
 
     /// Control task: tells about the tick.

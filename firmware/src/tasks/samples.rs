@@ -1,4 +1,5 @@
-//! The sample task: what the accelerometer says is recorded while somebody wants it.
+//! The sample task: what the accelerometer or the drives answer is recorded while somebody wants
+//! it.
 //!
 //! It shares the thread with the command task, which takes no line while a record is made.
 

@@ -1,5 +1,5 @@
 //! A plant at the other end of the firmware's second port: it carries the setpoints out and
-//! sends the samples of its accelerometer back.
+//! sends what its accelerometer or its drives answer back.
 
 use std::io::{self, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -7,7 +7,6 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
-use planner_core::accelerometer::SAMPLE_BYTES;
 use planner_core::telemetry::FrameDecoder;
 
 use crate::sensed_plant::SensedPlant;
@@ -41,7 +40,7 @@ impl PlantPort {
         thread::spawn(move || {
             to_send
                 .iter()
-                .try_for_each(|sample: [u8; SAMPLE_BYTES]| to_port.write_all(&sample))
+                .try_for_each(|answer: Vec<u8>| to_port.write_all(&answer))
         });
         Ok((Self { plant }, setpoints))
     }
@@ -56,7 +55,7 @@ impl PlantPort {
 fn follow(
     read: &Receiver<Vec<u8>>,
     onward: TcpStream,
-    answers: &Sender<[u8; SAMPLE_BYTES]>,
+    answers: &Sender<Vec<u8>>,
     plant: &Mutex<SensedPlant>,
 ) {
     let mut onward = Some(onward);
@@ -64,8 +63,8 @@ fn follow(
     for bytes in read {
         for frame in decoder.frames(&bytes) {
             let mut plant = plant.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some(sample) = plant.answer(&frame)
-                && answers.send(sample.encode()).is_err()
+            if let Some(answer) = plant.answer(&frame)
+                && answers.send(answer.encode()).is_err()
             {
                 return;
             }

@@ -86,6 +86,9 @@ pub struct PlantOutput {
     pub joint_position: [f64; JOINTS],
     /// Motor side of the joints, without noise: rad, a quill's mm.
     pub motor_position: [f64; JOINTS],
+    /// What the drives tell of how far the motors are behind their setpoints, with the encoders'
+    /// noise: rad, a quill's mm.
+    pub following_error: [f64; JOINTS],
     /// Drives whose torque stands at its limit.
     pub saturated: [bool; JOINTS],
 }
@@ -172,6 +175,9 @@ impl FullPlant {
             flange_mm,
             joint_position: std::array::from_fn(|i| s[LINK + i] / si[i]),
             motor_position: std::array::from_fn(|i| s[MOTOR + i] / si[i]),
+            following_error: std::array::from_fn(|i| {
+                f64::from(self.servos[i].following_error()) / si[i]
+            }),
             saturated: std::array::from_fn(|i| self.servos[i].is_saturated()),
         }
     }

@@ -1,14 +1,10 @@
 //! Homing on the emulated board, whose simulated arm has both encoders and limit inputs.
 
-use std::time::Duration;
-
 use crate::support::emulator;
 use host_tests::emulator::{Answer, Emulator, Pace};
 
-/// The position of a status report in mm, mm, mm and degrees, some ticks after the last answer:
-/// a report tells what the last tick has sent, and the position is set in the next one.
+/// The position of a status report in mm, mm, mm and degrees.
 fn position(emulator: &mut Emulator) -> [f64; 4] {
-    std::thread::sleep(Duration::from_millis(200));
     let status = emulator.status().unwrap();
     let field = status
         .split('|')

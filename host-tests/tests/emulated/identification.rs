@@ -89,17 +89,21 @@ fn the_firmware_finds_the_mode_and_stills_it() {
 
     let before = desk.left_by("G91 G1 X40 F9600");
     desk.left_by("X-40");
-    let heard = desk.ask("$ID=X40 F9600");
-    assert!(heard.ends_with("ok\r\n"), "{heard}");
-    let line = heard.lines().find_map(|line| line.strip_prefix("[ID:"));
-    let values: Vec<f64> = line
-        .unwrap_or_else(|| panic!("{heard}"))
-        .trim_end_matches(']')
-        .split(',')
-        .map(|value| value.parse().unwrap())
-        .collect();
-    assert!((values[0] / FREQUENCY_HZ - 1.0).abs() < 0.005, "{heard}");
-    assert!((values[1] - DAMPING).abs() < 0.002, "{heard}");
+    // One after the other: what one has asked for and not used does not keep the next one waiting.
+    let mut heard = String::new();
+    for line in ["$ID=X40 F9600", "$ID=X-40 F9600", "$ID=X40 F9600"] {
+        heard = desk.ask(line);
+        assert!(heard.ends_with("ok\r\n"), "{line}: {heard}");
+        let line = heard.lines().find_map(|line| line.strip_prefix("[ID:"));
+        let values: Vec<f64> = line
+            .unwrap_or_else(|| panic!("{heard}"))
+            .trim_end_matches(']')
+            .split(',')
+            .map(|value| value.parse().unwrap())
+            .collect();
+        assert!((values[0] / FREQUENCY_HZ - 1.0).abs() < 0.005, "{heard}");
+        assert!((values[1] - DAMPING).abs() < 0.002, "{heard}");
+    }
     let unfiltered = desk.port.plant().largest_after_stop_mm_s2(FELT_TICKS);
     assert!(desk.ask("$ID=store").ends_with("ok\r\n"));
     desk.wait(|plant| plant.stood_ticks() >= REST_TICKS);

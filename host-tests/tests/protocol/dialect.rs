@@ -786,25 +786,25 @@ const ALARMS: &[Row] = &[
 fn send(desk: &mut SerialLoop<'_>, item: &str) -> String {
     let wait = |desk: &mut SerialLoop<'_>, text: &str| {
         desk.run_ms(text.parse().unwrap_or(0));
-        desk.send(b"?");
+        desk.ask_status(b'?');
         desk.heard()
     };
     if let Some(line) = item.strip_suffix(" @stop") {
         let answer = desk.ask(line);
         desk.run_ms(60);
         desk.run_ms(30_000);
-        desk.send(b"?");
+        desk.ask_status(b'?');
         return answer + &desk.heard();
     }
     if let Some(line) = item.strip_suffix(" @pause") {
         let answer = desk.ask(line);
         desk.run_ms(3000);
-        desk.send(b"?");
+        desk.ask_status(b'?');
         return answer + &desk.heard();
     }
     let Some(own) = item.strip_prefix('@') else {
         return if item == "?" {
-            desk.send(b"?");
+            desk.ask_status(b'?');
             desk.heard()
         } else {
             desk.ask(item)
@@ -813,7 +813,7 @@ fn send(desk: &mut SerialLoop<'_>, item: &str) -> String {
     match own.split_once(' ').unwrap_or((own, "")) {
         ("wait", ms) => wait(desk, ms),
         ("full", _) => {
-            desk.send(&[0x87]);
+            desk.ask_status(0x87);
             desk.heard()
         }
         ("byte", hex) => {

@@ -110,7 +110,7 @@ fn joints_move_no_faster_than_set_and_smoothly() {
         desk.ask("$home-fast=20 home-slow=1");
         desk.send(b"$H\n");
         let mut last = desk.setpoint().joints;
-        let mut is_placed = false;
+        let (mut is_placed, mut is_answered) = (false, false);
         let mut top: f32 = 0.0;
         for _ in 0..600_000 {
             desk.tick();
@@ -133,11 +133,12 @@ fn joints_move_no_faster_than_set_and_smoothly() {
             let speed = [joints.velocity[0], joints.velocity[1], joints.velocity[3]];
             top = speed.into_iter().fold(top, |top, v| top.max(v.abs()));
             last = joints;
-            if desk.state() == "Idle" {
+            is_answered |= desk.heard().contains("ok");
+            if is_answered && is_placed {
                 break;
             }
         }
-        assert!(is_placed);
+        assert!(is_answered && is_placed);
         let expected = 20_f32.to_radians();
         assert!((top - expected).abs() < 1e-3 * expected, "{top}");
     });

@@ -1,6 +1,10 @@
-//! A record of the samples that an accelerometer sends, from a certain tick on.
+//! A record of the samples that an accelerometer or the drives send, from a certain tick on.
 
-use crate::accelerometer::{SampleDecoder, SampleFrame};
+use crate::accelerometer::SampleFrame;
+use crate::following_error::{FOLLOWING_ERROR_BYTES, FollowingErrorFrame};
+use crate::framing::Decoder;
+use crate::telemetry::Wanted;
+use crate::units::TICK_HZ;
 
 use super::record::Record;
 use super::refusal::Refusal;
@@ -16,13 +20,53 @@ const LOST_IN_A_ROW: u32 = 3;
 /// Samples of a record that may be lost altogether.
 const LOST_AT_ALL: u32 = 20;
 
+/// Samples that are asked for: those of the record, and those that may be lost. Were they asked
+/// for until the record is complete, a line that is slower than they come would still be busy
+/// with what nobody wants when the next record begins.
+const WANTED: u32 = (LISTENING_S * TICK_HZ as f32) as u32 + LOST_AT_ALL;
+
+/// What a record is of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Signal {
+    /// The acceleration along a direction, X, Y and Z, mm/s².
+    Acceleration([f32; 3]),
+    /// The following error of a joint, counted from 0, µrad or µm.
+    FollowingError(u8),
+}
+
+impl Signal {
+    /// What has to be asked for it.
+    const fn wanted(self) -> Wanted {
+        match self {
+            Self::Acceleration(_) => Wanted::Acceleration,
+            Self::FollowingError(_) => Wanted::FollowingErrors,
+        }
+    }
+
+    /// Number and sample of a frame that tells it.
+    fn sample(self, body: &[u8]) -> Option<(u32, f32)> {
+        match self {
+            Self::Acceleration(direction) => {
+                let frame = SampleFrame::from_body(body)?;
+                let parts = frame.acceleration_mm_s2.iter().zip(direction);
+                let along = parts.map(|(value, share)| value * share).sum();
+                Some((frame.sequence, along))
+            }
+            Self::FollowingError(joint) => {
+                let frame = FollowingErrorFrame::from_body(body)?;
+                Some((frame.sequence, *frame.error.get(usize::from(joint))?))
+            }
+        }
+    }
+}
+
 /// What to record.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Listen {
     /// Number of the setpoint whose answer counts first, or a later one.
     pub from: u32,
-    /// Direction of the component that counts, X, Y and Z.
-    pub direction: [f32; 3],
+    /// What of.
+    pub signal: Signal,
 }
 
 /// How far a record has come.
@@ -31,7 +75,8 @@ pub enum Listening {
     /// Nothing is to be recorded.
     #[default]
     Idle,
-    /// Samples are awaited, or come: so many have come.
+    /// Samples are awaited, or come: so many have been heard, those that are late for another
+    /// record included. It wraps.
     Busy(u16),
     /// Too many samples were lost, so the record is none.
     Torn,
@@ -39,15 +84,19 @@ pub enum Listening {
     Complete,
 }
 
-/// Takes the bytes of an accelerometer; 2.2 KiB.
+/// Takes the bytes of an accelerometer or of the drives; 2.2 KiB.
 #[derive(Debug, Default)]
 pub struct Listener {
-    decoder: SampleDecoder,
+    decoder: Decoder<FOLLOWING_ERROR_BYTES>,
     record: Record,
-    listen: Listen,
+    signal: Option<Signal>,
     progress: Listening,
-    /// The last sample.
-    last: f32,
+    /// Number of the setpoint whose answer is next.
+    next: u32,
+    /// The tick before which samples were first asked for.
+    asked: Option<u32>,
+    /// The last sample of the record.
+    last: Option<f32>,
     /// Samples lost.
     lost: u32,
 }
@@ -57,29 +106,41 @@ impl Listener {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            decoder: SampleDecoder::new(),
+            decoder: Decoder::new(),
             record: Record::new(),
-            listen: Listen {
-                from: 0,
-                direction: [0.0; 3],
-            },
+            signal: None,
             progress: Listening::Idle,
-            last: 0.0,
+            next: 0,
+            asked: None,
+            last: None,
             lost: 0,
         }
     }
 
-    /// Whether samples are wanted.
-    #[must_use]
-    pub const fn is_busy(&self) -> bool {
-        matches!(self.progress, Listening::Busy(_))
+    /// What is wanted of the setpoint frame that comes next; `ticks` is its number, or a little
+    /// less.
+    pub fn wants(&mut self, ticks: u32) -> Wanted {
+        match (self.progress, self.signal) {
+            (Listening::Busy(_), Some(signal)) => {
+                let first = *self.asked.get_or_insert(ticks);
+                if ticks.wrapping_sub(first) < WANTED {
+                    signal.wanted()
+                } else {
+                    Wanted::Nothing
+                }
+            }
+            _ => Wanted::Nothing,
+        }
     }
 
     /// Begins a record, instead of any other.
     pub fn listen(&mut self, listen: Listen) {
         self.record.clear();
-        self.listen = listen;
+        self.signal = Some(listen.signal);
+        self.next = listen.from;
         self.progress = Listening::Busy(0);
+        self.asked = None;
+        self.last = None;
         self.lost = 0;
     }
 
@@ -89,41 +150,43 @@ impl Listener {
         self.progress
     }
 
-    /// Takes bytes from the accelerometer. Cost on a Cortex-M4F: some 60 instructions a byte.
+    /// Takes bytes. Cost on a Cortex-M4F: some 60 instructions a byte.
     pub fn hear(&mut self, bytes: &[u8]) {
         for &byte in bytes {
-            if let Some(frame) = self.decoder.push(byte) {
-                self.take(&frame);
+            let Some(Ok(body)) = self.decoder.push(byte) else {
+                continue;
+            };
+            let sample = self.signal.and_then(|signal| signal.sample(body));
+            if let Some((sequence, sample)) = sample {
+                self.take(sequence, sample);
             }
         }
     }
 
-    fn take(&mut self, frame: &SampleFrame) {
-        let Listening::Busy(count) = self.progress else {
+    fn take(&mut self, sequence: u32, sample: f32) {
+        let Listening::Busy(heard) = self.progress else {
             return;
         };
-        let ahead = frame.sequence.wrapping_sub(self.listen.from);
+        self.progress = Listening::Busy(heard.wrapping_add(1));
+        let ahead = sequence.wrapping_sub(self.next);
         if ahead > u32::MAX / 2 {
             // an answer to a setpoint before the first one that counts
             return;
         }
-        let parts = frame.acceleration_mm_s2.iter().zip(self.listen.direction);
-        let sample: f32 = parts.map(|(value, share)| value * share).sum();
-        if count > 0 {
+        if let Some(last) = self.last {
             self.lost = self.lost.saturating_add(ahead);
             if ahead > LOST_IN_A_ROW || self.lost > LOST_AT_ALL {
                 self.progress = Listening::Torn;
                 return;
             }
-            let step = (sample - self.last) / (ahead + 1) as f32;
+            let step = (sample - last) / (ahead + 1) as f32;
             for place in 1..=ahead {
-                self.record.push(self.last + place as f32 * step);
+                self.record.push(last + place as f32 * step);
             }
         }
         self.record.push(sample);
-        self.last = sample;
-        self.listen.from = frame.sequence.wrapping_add(1);
-        self.progress = Listening::Busy(count.saturating_add(1));
+        self.last = Some(sample);
+        self.next = sequence.wrapping_add(1);
         if self.record.length_s() >= LISTENING_S {
             self.progress = Listening::Complete;
         }
@@ -159,7 +222,7 @@ mod tests {
         assert_eq!(listener.progress(), Listening::Idle);
         listener.listen(Listen {
             from: 100,
-            direction: [0.6, 0.8, 0.0],
+            signal: Signal::Acceleration([0.6, 0.8, 0.0]),
         });
         listener
     }
@@ -169,7 +232,7 @@ mod tests {
         let mut listener = listening();
         for sequence in 40..1099 {
             listener.hear(&sample(sequence).encode());
-            let count = u16::try_from(sequence.saturating_sub(99)).unwrap();
+            let count = u16::try_from(sequence - 39).unwrap();
             assert_eq!(listener.progress(), Listening::Busy(count));
         }
         listener.hear(&sample(1099).encode());
@@ -187,6 +250,48 @@ mod tests {
                 wanted_s: 0.25
             })
         );
+    }
+
+    /// However long the answers take, no more is asked for than the record can use.
+    #[test]
+    fn so_many_samples_are_asked_for_and_no_more() {
+        let mut listener = listening();
+        assert_eq!(listener.wants(u32::MAX - 99), Wanted::Acceleration);
+        let wanted = (0..3000_u32).filter(|tick| {
+            let ticks = tick.wrapping_add(u32::MAX - 98);
+            listener.wants(ticks) == Wanted::Acceleration
+        });
+        assert_eq!(wanted.count(), 1019);
+        listener.listen(Listen {
+            from: 7,
+            signal: Signal::FollowingError(2),
+        });
+        assert_eq!(listener.wants(9), Wanted::FollowingErrors);
+    }
+
+    #[test]
+    fn a_joint_is_recorded_from_the_drives_frames_alone() {
+        let mut listener = Listener::new();
+        listener.listen(Listen {
+            from: 1,
+            signal: Signal::FollowingError(1),
+        });
+        for sequence in 1..=1000 {
+            let SampleFrame {
+                acceleration_mm_s2: [x, y, _],
+                ..
+            } = sample(sequence);
+            let frame = FollowingErrorFrame {
+                sequence,
+                error: [3.0, 0.01 * (x + y), 7.0, 0.0],
+            };
+            listener.hear(&sample(sequence).encode());
+            listener.hear(&frame.encode());
+        }
+        assert_eq!(listener.progress(), Listening::Complete);
+        let mode = &listener.identify().unwrap().modes[0];
+        assert!((mode.decay.rate[1] - 60.0).abs() < 0.01, "{mode:?}");
+        assert!((mode.amplitude() - 13.9).abs() < 0.1, "{mode:?}");
     }
 
     /// What a record shows from which these samples are missing.

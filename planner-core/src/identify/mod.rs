@@ -2,7 +2,7 @@
 //!
 //! | step | |
 //! |---|---|
-//! | [`Listener`] | takes an accelerometer's frames, from a certain tick on |
+//! | [`Listener`] | takes the frames of an accelerometer or of the drives, from a certain tick on |
 //! | [`Record`] | thins the samples out as they arrive |
 //! | `scan` | finds where to begin, over windows of four lengths |
 //! | `decay` | fits one mode; what it leaves is scanned again, and two modes are fitted |
@@ -28,7 +28,7 @@ use core::f32::consts::TAU;
 use heapless::Vec;
 
 pub use decay::{Complex, Decay};
-pub use listener::{LISTENING_S, Listen, Listener, Listening};
+pub use listener::{LISTENING_S, Listen, Listener, Listening, Signal};
 pub use mode::{DAMPING_WITHIN, FREQUENCY_WITHIN, IdentifiedMode, LEAST_CONFIDENCE, MODES};
 pub use record::{CAPACITY, LONGEST_S, Record, SHORTEST_S};
 pub use refusal::Refusal;

@@ -4,7 +4,7 @@ use heapless::Deque;
 
 use crate::config::{ConfigError, Robot, SettingError};
 use crate::gcode::{Line, LineBuffer, Offsets, Received};
-use crate::identify::{self, Identified, Listen};
+use crate::identify::{self, Identified, Listen, Signal};
 use crate::joint_space::Space;
 use crate::motion::{MotionState, Order};
 use crate::planner::{LineError, Planner};
@@ -54,8 +54,7 @@ pub enum Step {
     Keep(Record),
     /// Forget all records, then call [`Controller::kept`].
     ForgetRecords,
-    /// Have the accelerometer's samples recorded ([`crate::identify::Listener`]); the reports
-    /// tell how far that is.
+    /// Have samples recorded ([`crate::identify::Listener`]); the reports tell how far that is.
     Listen(Listen),
     /// Call [`Controller::identified`] with what the record shows.
     Identify,
@@ -129,7 +128,8 @@ enum AfterStop {
 /// an earlier one, so that no number of bytes makes anything overflow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Wishes {
-    status: bool,
+    /// A status report; not one of before the orders given until then, so many, were obeyed.
+    status: Option<u32>,
     full_status: bool,
     reset: bool,
     stop: bool,
@@ -142,7 +142,7 @@ struct Wishes {
 
 impl Wishes {
     const NONE: Self = Self {
-        status: false,
+        status: None,
         full_status: false,
         reset: false,
         stop: false,
@@ -233,7 +233,7 @@ impl<'c, 'q> Controller<'c, 'q> {
             hold: Hold::None,
             after_stop: None,
             homing: Homing::new(),
-            identification: Identification::new([0.0; 3]),
+            identification: Identification::new(Signal::Acceleration([0.0; 3])),
             mode_found: None,
             rates: Rates::FULL,
             cadence: Cadence::new(),
@@ -304,7 +304,7 @@ impl<'c, 'q> Controller<'c, 'q> {
     /// What to do next.
     pub fn step(&mut self, now_ms: u64, report: &Report) -> Step {
         loop {
-            if core::mem::take(&mut self.wishes.status) {
+            if self.status_is_due(report) {
                 return Step::Say(self.status(report));
             }
             if self.grant(report) {
@@ -330,6 +330,13 @@ impl<'c, 'q> Controller<'c, 'q> {
             }
             return Step::Wait(self.wake_ms(now_ms, report));
         }
+    }
+
+    /// Whether a status report is wished for and can be given: what was said before the wish has
+    /// had its effect.
+    fn status_is_due(&self, report: &Report) -> bool {
+        let is_obeyed = |orders| report.orders.wrapping_sub(orders) <= u32::MAX / 2;
+        self.wishes.status.is_some_and(is_obeyed)
     }
 
     fn out(&mut self, out: Out) {
@@ -403,6 +410,7 @@ impl<'c, 'q> Controller<'c, 'q> {
             || self.after_stop.is_some()
             || matches!(self.mode, Mode::Jogging | Mode::Homing | Mode::Identifying)
             || self.startup.is_some()
+            || self.wishes.status.is_some()
             || (!self.inbox.is_empty() && self.after_stop.is_none())
             || (!self.planner.has_room() && self.cycle_start.is_waiting())
             || self.settings.protocol.hard_limits
@@ -426,10 +434,9 @@ impl Controller<'_, '_> {
     /// them, and only those.
     fn wish(&mut self, byte: u8) {
         match byte {
-            b'?' => self.wishes.status = true,
-            0x87 => {
-                self.wishes.status = true;
-                self.wishes.full_status = true;
+            b'?' | 0x87 => {
+                self.wishes.status.get_or_insert(self.orders);
+                self.wishes.full_status |= byte == 0x87;
             }
             0x18 => {
                 self.inbox.clear();
@@ -739,11 +746,15 @@ impl Controller<'_, '_> {
         }
     }
 
-    /// Takes back what M100 has changed, as a reset does with all modes. What M101 and M102
-    /// have changed stays as it is, because the arm does.
+    /// Takes back what M100 or an identification has changed, as a reset does with all modes.
+    /// What M101 and M102 have changed stays as it is, because the arm does.
     #[inline(never)]
     fn forget_robot_words(&mut self) {
-        if self.robot().config.prefilter == self.settings.robot.prefilter {
+        let (now, settings) = (&self.robot().config, &self.settings.robot);
+        if now.prefilter == settings.prefilter
+            && now.automatic == settings.automatic
+            && now.map == settings.map
+        {
             return;
         }
         // They have been in force before: this does not fail.
@@ -789,6 +800,7 @@ impl Controller<'_, '_> {
 
     #[inline(never)]
     fn status(&mut self, report: &Report) -> Text {
+        self.wishes.status = None;
         let full = core::mem::take(&mut self.wishes.full_status);
         let state = self.state(report);
         let extra = self.cadence.next(state != State::Idle);
@@ -1042,7 +1054,7 @@ impl Controller<'_, '_> {
             _ if !at_rest => self.refuse(Refusal::NotIdle),
             Dollar::Check => self.toggle_check(report),
             Dollar::Home => self.home(report),
-            Dollar::Identify(text) => self.identify(text),
+            Dollar::Identify(joint, text) => self.identify(joint, text),
             Dollar::Identified => self.show_mode_found(),
             Dollar::StoreIdentified => self.store_mode_found(),
             Dollar::Sleep => {
@@ -1298,7 +1310,7 @@ impl Controller<'_, '_> {
 impl Controller<'_, '_> {
     /// Begins with the move; the answer comes at the end.
     #[inline(never)]
-    fn identify(&mut self, text: &str) {
+    fn identify(&mut self, joint: Option<u8>, text: &str) {
         match self.mode {
             Mode::Ready if self.hold == Hold::None => {}
             Mode::Locked => return self.refuse(Refusal::Locked),
@@ -1316,7 +1328,10 @@ impl Controller<'_, '_> {
         match self.planner.jog(jog.as_bytes()) {
             Ok(accepted) if accepted.queued => {
                 let direction = start.zip(self.target()).map(direction);
-                self.identification = Identification::new(direction.unwrap_or_default());
+                self.identification = Identification::new(match joint {
+                    None => Signal::Acceleration(direction.unwrap_or_default()),
+                    Some(joint) => Signal::FollowingError(joint),
+                });
                 self.mode = Mode::Identifying;
                 self.out(Out::Order(Order::Start));
             }
@@ -1333,12 +1348,14 @@ impl Controller<'_, '_> {
         }
     }
 
-    /// The prefilter that leaves most of the vibration. It always can be made, and the other
-    /// settings have been in force before.
+    /// The prefilter that leaves most of the vibration, wherever the move goes. It always can be
+    /// made, and the other settings have been in force before.
     #[inline(never)]
     fn excite(&mut self) -> Result<(), ConfigError> {
         let mut config = self.settings.robot;
         config.prefilter = EXCITING;
+        config.map = ModeMapConfig::NONE;
+        config.automatic = false;
         self.planner.set_config(&config)
     }
 
@@ -1355,11 +1372,19 @@ impl Controller<'_, '_> {
             identification::Next::Wait => return false,
             identification::Next::Listen(listen) => self.out(Out::Listen(listen)),
             identification::Next::Identify => self.out(Out::Identify),
-            identification::Next::Torn => self.not_identified(
-                "Samples of the accelerometer were lost: check its line and identify again",
-            ),
-            identification::Next::Silent => self
-                .not_identified("The accelerometer is silent: check that it answers the setpoints"),
+            identification::Next::Torn => {
+                self.not_identified("Samples were lost: check their line and identify again");
+            }
+            identification::Next::Silent => {
+                self.not_identified(match self.identification.signal() {
+                    Signal::Acceleration(_) => {
+                        "The accelerometer is silent: check that it answers the setpoints"
+                    }
+                    Signal::FollowingError(_) => {
+                        "The drives tell no following error: check that they answer the setpoints"
+                    }
+                });
+            }
         }
         true
     }

@@ -33,8 +33,10 @@ pub enum Dollar<'a> {
     Unlock,
     /// `$H`: home.
     Home,
-    /// `$ID=move`: identify the mode that a move excites, relative and with its feedrate.
-    Identify(&'a str),
+    /// `$ID=move`: identify the mode that a move excites, relative and with its feedrate, by the
+    /// accelerometer; `$ID1=move` to `$ID4=move`: by the following error of that joint, counted
+    /// from 0 here.
+    Identify(Option<u8>, &'a str),
     /// `$ID`: what was identified last.
     Identified,
     /// `$ID=store`: that is the prefilter's mode from now on.
@@ -111,13 +113,25 @@ impl<'a> Dollar<'a> {
         let value = value.trim();
         match key.trim() {
             "J" | "j" => Some(Self::Jog(value)),
-            "ID" | "id" => Some(Self::Identify(value)),
+            "ID" | "id" => Some(Self::Identify(None, value)),
             "I" | "i" => Some(Self::NameBuild(value)),
             "N0" | "n0" => Some(Self::SetStartupLine(0, value)),
             "N1" | "n1" => Some(Self::SetStartupLine(1, value)),
             "RST" | "rst" => None,
-            _ => Some(Self::Set(text)),
+            key => Some(match joint_of_identify(key) {
+                Some(joint) => Self::Identify(Some(joint), value),
+                None => Self::Set(text),
+            }),
         }
+    }
+}
+
+/// The joint of `ID1` to `ID4`, counted from 0.
+fn joint_of_identify(key: &str) -> Option<u8> {
+    let number = key.strip_prefix("ID").or_else(|| key.strip_prefix("id"))?;
+    match number.as_bytes() {
+        [digit @ b'1'..=b'4'] => Some(digit - b'1'),
+        _ => None,
     }
 }
 
@@ -139,7 +153,10 @@ mod tests {
             ("I=left cell", Dollar::NameBuild("left cell")),
             ("I+", Dollar::MoreBuildInfo),
             ("id", Dollar::Identified),
-            ("ID=X10 F9600", Dollar::Identify("X10 F9600")),
+            ("ID=X10 F9600", Dollar::Identify(None, "X10 F9600")),
+            ("ID1=X10 F9600", Dollar::Identify(Some(0), "X10 F9600")),
+            ("id4 = X10F9600", Dollar::Identify(Some(3), "X10F9600")),
+            ("ID5=3", Dollar::Set("ID5=3")),
             ("ID=STORE", Dollar::StoreIdentified),
             ("10", Dollar::Show("10")),
             ("frequency", Dollar::Show("frequency")),

@@ -2,7 +2,7 @@
 //!
 //! | phase | until | then |
 //! |---|---|---|
-//! | move | the motion stands; the accelerometer is not heeded | settle |
+//! | move | the motion stands; nothing is listened to | settle |
 //! | settle | the drives stand too, 50 ms later | listen |
 //! | listen | the record of 1 s is complete | identify |
 //!
@@ -12,14 +12,16 @@
 //! Start and stop both excite. If the time between them is a whole number and a half of
 //! periods they add up, if it is a whole number they nearly cancel: a record in which nothing
 //! stands out calls for another length.
+//!
+//! A mode that changes with the posture is that of the place where the move ends.
 
-use crate::identify::{Listen, Listening};
+use crate::identify::{Listen, Listening, Signal};
 use crate::prefilter::{Kind, PrefilterConfig};
 
 /// After the motion stands, until the record begins, in ms.
 const SETTLE_MS: u32 = 50;
 
-/// Longest wait for a sample, in ms: an accelerometer that does not answer is not there.
+/// Longest wait for a sample, in ms: who does not answer is not there.
 const PATIENCE_MS: u32 = 3_000;
 
 /// The prefilter of the move.
@@ -70,20 +72,26 @@ pub enum Next {
 #[derive(Clone, Copy, Debug)]
 pub struct Identification {
     phase: Phase,
-    direction: [f32; 3],
+    signal: Signal,
     /// What was heard at the last look.
     heard: Listening,
 }
 
 impl Identification {
-    /// One whose move has this direction.
+    /// One whose record is of this signal.
     #[must_use]
-    pub const fn new(direction: [f32; 3]) -> Self {
+    pub const fn new(signal: Signal) -> Self {
         Self {
             phase: Phase::Move,
-            direction,
+            signal,
             heard: Listening::Idle,
         }
+    }
+
+    /// What its record is of.
+    #[must_use]
+    pub const fn signal(&self) -> Signal {
+        self.signal
     }
 
     /// What to do next. `ticks` is how many there were since the start, `stands` says whether
@@ -99,7 +107,7 @@ impl Identification {
                 self.phase = Phase::Listen(ticks.wrapping_add(PATIENCE_MS));
                 Next::Listen(Listen {
                     from: ticks,
-                    direction: self.direction,
+                    signal: self.signal,
                 })
             }
             Phase::Listen(_) if listening == Listening::Complete => Next::Identify,
@@ -123,15 +131,15 @@ mod tests {
     const START: u32 = u32::MAX - 20;
 
     fn listening() -> (Identification, u32) {
-        let mut identification = Identification::new([0.0, 1.0, 0.0]);
+        let signal = Signal::Acceleration([0.0, 1.0, 0.0]);
+        let mut identification = Identification::new(signal);
         let mut next = |ticks, stands| identification.next(ticks, stands, Listening::Idle);
         assert_eq!(next(START, false), Next::Wait);
         for ahead in 0..50 {
             assert_eq!(next(START.wrapping_add(ahead), true), Next::Wait);
         }
         let from = START.wrapping_add(50);
-        let direction = [0.0, 1.0, 0.0];
-        assert_eq!(next(from, true), Next::Listen(Listen { from, direction }));
+        assert_eq!(next(from, true), Next::Listen(Listen { from, signal }));
         (identification, from)
     }
 
@@ -145,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn an_accelerometer_that_does_not_answer_is_not_awaited_for_ever() {
+    fn who_does_not_answer_is_not_awaited_for_ever() {
         let (mut identification, from) = listening();
         let mut after =
             |ms, count| identification.next(from.wrapping_add(ms), true, Listening::Busy(count));

@@ -25,6 +25,7 @@ pub struct Servo {
     observer: Observer,
     integral: f32,
     torque: f32,
+    lag: f32,
 }
 
 impl Servo {
@@ -46,6 +47,7 @@ impl Servo {
             observer: Observer::new(config.observer_rad_s, position),
             integral: 0.0,
             torque: 0.0,
+            lag: 0.0,
         })
     }
 
@@ -62,6 +64,7 @@ impl Servo {
         let sixteenths = cycle.min(CYCLES_PER_TICK) * (SIXTEENTHS / CYCLES_PER_TICK);
         let lag = self.cubic.way_to(encoder, sixteenths).wrapping_neg();
         let lag = lag as f32 * (self.si_per_lsb / 65_536.0);
+        self.lag = lag;
         let wanted = self.cubic.velocity(sixteenths) * self.si_per_lsb;
         let acceleration = self.cubic.acceleration(sixteenths + 1) * self.si_per_lsb;
 
@@ -79,6 +82,13 @@ impl Servo {
         }
         self.observer.predict(self.torque / config.motor_inertia);
         self.torque
+    }
+
+    /// How far the encoder was behind the setpoint in the last cycle, in rad or m: what a drive
+    /// tells the controller of itself ([`crate::following_error`]).
+    #[must_use]
+    pub const fn following_error(&self) -> f32 {
+        self.lag
     }
 
     /// Whether the torque stands at its limit.
