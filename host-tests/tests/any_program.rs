@@ -156,7 +156,7 @@ fn circles_of_chords_are_hardly_slower_than_the_bound() {
             (25.0, 1.0, 4, 0.1, 0.09),
             (100.0, 0.1, 3, 0.5, 0.05),
             (5.0, 0.2, 4, 0.05, 0.14),
-            (60.0, 0.5, 4, 0.02, 0.05),
+            (60.0, 0.5, 4, 0.02, 0.06),
             // rounded so far that the chords' directions are noise
             (25.0, 0.2, 3, 0.1, 0.12),
             (25.0, 0.1, 3, 0.1, 0.4),
@@ -216,7 +216,7 @@ fn round(at: f64) -> [f64; 2] {
 
 #[test]
 fn a_curve_of_chords_is_walked_near_its_bound() {
-    for (count, most) in [(1500, 0.2), (400, 0.2), (150, 0.45)] {
+    for (count, most) in [(1500, 0.2), (400, 0.2), (150, 0.35)] {
         let mut program = String::from("G0 X480 Y0\nG1 F9600\n");
         for i in 1..=count {
             let [x, y] = figure_of_eight(f64::from(i) / f64::from(count));
@@ -230,7 +230,7 @@ fn a_curve_of_chords_is_walked_near_its_bound() {
 /// Each of the arcs is shorter than the prefilter: one at a time they would take 22 s.
 #[test]
 fn a_chain_of_short_arcs_is_walked_near_its_bound() {
-    for (count, most) in [(100, 0.2), (40, 0.2), (16, 0.3)] {
+    for (count, most) in [(100, 0.2), (40, 0.2)] {
         let mut program = String::from("G0 X505 Y0\nG1 F9600\n");
         for i in 0..count {
             let [x0, y0] = round(f64::from(i) / f64::from(count));

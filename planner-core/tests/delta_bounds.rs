@@ -3,6 +3,8 @@
 #[path = "support/delta.rs"]
 mod geometry;
 
+use std::f64::consts::TAU;
+
 use geometry::{Geometry, WORKSPACE, dot};
 use planner_core::kinematics::{Delta, DeltaConfig, RateBounds, Sweep};
 use proptest::prelude::*;
