@@ -33,6 +33,7 @@ pub mod rate;
 pub mod raw;
 mod schedule;
 pub mod servo;
+mod sort;
 pub mod store;
 pub mod telemetry;
 pub mod units;
