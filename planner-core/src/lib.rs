@@ -36,6 +36,7 @@ pub mod rate;
 pub mod raw;
 mod schedule;
 pub mod servo;
+mod sort;
 pub mod store;
 pub mod telemetry;
 pub mod units;

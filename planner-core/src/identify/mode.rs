@@ -5,6 +5,7 @@ use core::f32::consts::{SQRT_2, TAU};
 use heapless::Vec;
 
 use crate::math::sqrt_f32;
+use crate::sort::sort_by;
 
 use super::decay::{Complex, Decay, Fit, exponential, product, quotient};
 use super::noise::Noise;
@@ -98,7 +99,9 @@ pub fn found<const N: usize>(
         let pushed = all.push(found);
         debug_assert!(pushed.is_ok());
     }
-    all.sort_unstable_by(|a, b| length(b.decay.amplitude).total_cmp(&length(a.decay.amplitude)));
+    sort_by(&mut all, |one, other| {
+        length(one.decay.amplitude) > length(other.decay.amplitude)
+    });
     all
 }
 

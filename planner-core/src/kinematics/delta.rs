@@ -97,7 +97,7 @@ impl Limb {
             self.half.1 as f32 * MM_PER_LSB,
         );
         let (hh, kk) = (h * h, k * k);
-        let per = 1.0 / (hh + kk).max(f32::MIN_POSITIVE);
+        let per = 1.0 / at_least(hh + kk, f32::MIN_POSITIVE);
         (2.0 * h * k * per, (hh - kk) * per)
     }
 }
@@ -243,7 +243,7 @@ impl Delta {
             let (sine, cosine) = limb.sine_cosine();
             let lever = self.offset_mm + self.upper_arm_mm * cosine;
             let drop = self.upper_arm_mm * sine;
-            let root = (limb.root as f32 * MM_PER_LSB).max(self.slowest_root_mm);
+            let root = at_least(limb.root as f32 * MM_PER_LSB, self.slowest_root_mm);
             let per = 1.0 / (self.upper_arm_mm * root);
             *rate = (shared_velocity - u_velocity * lever + vz * drop) * per;
             // -2 t·v + m θ'
@@ -260,6 +260,12 @@ impl Delta {
             acceleration: accelerations,
         }
     }
+}
+
+/// The larger of two numbers: a comparison, where `f32::max` calls a function for numbers that
+/// are none.
+fn at_least(value: f32, least: f32) -> f32 {
+    if value > least { value } else { least }
 }
 
 /// `u` of an arm, 1 to 3.

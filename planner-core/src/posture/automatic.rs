@@ -8,6 +8,7 @@ use heapless::Vec;
 use super::course::{Course, between};
 use super::follow::ShortestConfig;
 use crate::prefilter::{Band, Kernel, Kind, Mode, Prefilter, PrefilterConfig, residual};
+use crate::sort::sort_by;
 
 /// What a prefilter has to achieve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -336,11 +337,12 @@ impl Shortest {
             // there is room for every kind
             let _ = all.push((kind, reach, length_s));
         }
-        all.sort_unstable_by(|(_, reach, length_s), (_, other_reach, other_s)| {
-            length_s
-                .total_cmp(other_s)
-                .then(other_reach.total_cmp(reach))
-        });
+        sort_by(
+            &mut all,
+            |(_, reach, length_s), (_, other_reach, other_s)| {
+                length_s < other_s || length_s == other_s && reach > other_reach
+            },
+        );
         let furthest = all.iter().map(|(_, reach, _)| *reach).fold(0.0, f32::max);
         if furthest < config.uncertainty {
             return Err(ShortestError::None {
@@ -476,7 +478,8 @@ fn by_length(kinds: &[Kind]) -> Vec<Kind, { Kind::ALL.len() }> {
         .filter(|kind| kind.follows_the_mode())
         .take(Kind::ALL.len())
         .collect();
-    by_length.sort_unstable_by_key(|kind| (kind.quarter_periods(), *kind as u8));
+    let key = |kind: &Kind| (kind.quarter_periods(), *kind as u8);
+    sort_by(&mut by_length, |one, other| key(one) < key(other));
     by_length
 }
 

@@ -4,6 +4,7 @@ use heapless::Vec;
 
 use super::kind::{Boxes, Shaper};
 use super::{Impulse, Impulses, Kind, Mode, PrefilterConfig, PrefilterError, Response, SecondMode};
+use crate::sort::sort_by;
 
 /// Stages in a cascade: FIR-ZVDD for two modes has eight, and one more delays.
 pub const MAX_STAGES: usize = 9;
@@ -255,7 +256,7 @@ impl Prefilter {
                 _ => None,
             })
             .collect();
-        boxes_s.sort_unstable_by(|one, other| other.total_cmp(one));
+        sort_by(&mut boxes_s, |one, other| one > other);
         boxes_s
     }
 

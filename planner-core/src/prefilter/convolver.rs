@@ -165,8 +165,9 @@ impl<const AXES: usize> Filter<AXES> {
             line[slot::<FIRST, USED>(newest)] = sample;
             let delayed = Delayed::<AXES, FIRST, USED> {
                 line,
+                newest: &sample,
                 head: self.head,
-                age: self.age,
+                oldest: self.age.saturating_add(usize::from(stage.first_slot)),
                 rest: &self.rest,
             };
             let total = match stage.shape {
@@ -196,8 +197,11 @@ impl<const AXES: usize> Filter<AXES> {
 /// The delay line as a stage reads it.
 struct Delayed<'a, const AXES: usize, const FIRST: usize, const USED: usize> {
     line: &'a Line<AXES>,
+    /// What the stage's first tap reads.
+    newest: &'a [i32; AXES],
     head: usize,
-    age: usize,
+    /// The last of its slots, counted from `head`, that holds a sample from after the reset.
+    oldest: usize,
     rest: &'a [i32; AXES],
 }
 
@@ -210,10 +214,11 @@ impl<const AXES: usize, const FIRST: usize, const USED: usize> Delayed<'_, AXES,
         };
         *left = others;
         let samples: [&[i32; AXES]; TAPS] = core::array::from_fn(|i| {
-            let tap = &taps[i];
-            if usize::from(tap.delay) <= self.age {
-                let at = self.head.wrapping_add(usize::from(tap.slot));
-                &self.line[slot::<FIRST, USED>(at)]
+            let place = usize::from(taps[i].slot);
+            if i == 0 {
+                self.newest
+            } else if place <= self.oldest {
+                &self.line[slot::<FIRST, USED>(self.head.wrapping_add(place))]
             } else {
                 self.rest
             }

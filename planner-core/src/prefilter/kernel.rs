@@ -98,7 +98,7 @@ fn centroid(shape: Shape, taps: &[Tap]) -> TickTime {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kernel {
     pub(super) stages: Vec<StageShape, MAX_STAGES>,
-    /// Those of all stages, in their order.
+    /// Those of all stages, in their order; the first one of each has no delay.
     pub(super) taps: Vec<Tap, MAX_TAPS>,
     length_ticks: u16,
     delay_ticks: u16,
@@ -157,7 +157,7 @@ impl Kernel {
         Ok(kernel)
     }
 
-    /// Adds a stage; none if there is no room for it.
+    /// Adds a stage whose first weight is that of delay 0; none if there is no room for it.
     fn push(&mut self, shape: Shape, weights: &[(u16, i32)]) -> Option<()> {
         let first_slot = self.length_ticks;
         let place = self.taps.len();

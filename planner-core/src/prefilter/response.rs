@@ -3,6 +3,7 @@
 use heapless::Vec;
 
 use super::{Impulse, Impulses, Stage};
+use crate::sort::sort_by;
 
 /// Breakpoints of a response while it is made: FIR-3-hump-EI for each of two modes has 49.
 const MAX_BREAKS: usize = 50;
@@ -80,7 +81,7 @@ impl Response {
         let mut terms = Terms::new();
         add_terms(&mut terms, stages, reversed);
         let variance_s2: f64 = stages.iter().map(Stage::variance_s2).sum();
-        terms.sort_unstable_by(|x, y| x.b.total_cmp(&y.b));
+        sort_by(&mut terms, |one, other| one.b < other.b);
         self.set_terms(&terms, 1 + boxes(stages));
         self.spread_s = libm::sqrt(variance_s2) as f32;
     }
