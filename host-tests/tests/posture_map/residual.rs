@@ -1,5 +1,14 @@
 //! What is left of a mode of 8 to 20 Hz after random moves, on the full plant: with the map, and
-//! with the best prefilter for one frequency.
+//! with the best prefilter for one frequency. It counts from when the plant has carried out the
+//! last setpoint.
+//!
+//! The tool also swings with the joints' own modes. Held by their drives they are at 28 to 45 Hz
+//! by posture, and damped so little that two fifths are left of them 150 ms after the stop. They
+//! have nothing to do with the map: without a prefilter for them they are most of what a pure
+//! shaper leaves with the map (ZV: 0.39 mm, of the mode itself 0.01), and hide what it gains. A
+//! robot's builder gives them the prefilter's second mode; here both sides have it.
+
+use std::ops::Range;
 
 use host_tests::plant::full::LATENCY_TICKS;
 use host_tests::plant::{FullConfig, FullPlant, JointSetpoint, Mode, ModeMap};
@@ -14,9 +23,8 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::support::{DAMPING, Orders, TICK_S, frequency_hz, robot, setpoints};
 
-/// What the drives take to follow the command to its stop and the joints' own modes of 36 Hz
-/// and more, which no prefilter is made for here, take to die down.
-const LAG_TICKS: usize = 150;
+/// For the joints' own modes: a box and an impulse pair in the middle of what they are, 43 ms.
+const JOINTS: &str = "prefilter2=fir-zv frequency2=35 damping2=0.05";
 
 /// How long what is left is looked at.
 const REST_TICKS: usize = 300;
@@ -52,7 +60,7 @@ fn left_mm(setpoints: &[Setpoint], moving: usize) -> f64 {
         start: joints(&setpoints[0]),
         ..FullConfig::default()
     });
-    let driven = moving + LATENCY_TICKS + LAG_TICKS;
+    let driven = moving + LATENCY_TICKS;
     let last = setpoints.last().expect("a move has setpoints");
     let rest = std::iter::repeat(last);
     let mut left_mm = 0.0_f64;
@@ -102,30 +110,38 @@ fn measure(robot: &Robot, moves: &[String]) -> Figures {
     }
 }
 
-/// A prefilter that follows the map or is made for one frequency.
+/// A prefilter that follows the map or is made for one frequency, and what else is set.
 #[derive(Clone, Copy, Debug)]
 enum Filter {
-    Named(Kind),
-    Boxes(PostureMethod),
+    Named(Kind, &'static str),
+    Boxes(PostureMethod, &'static str),
 }
 
 impl Filter {
     fn with_map(self) -> Robot {
         robot(|config| match self {
-            Self::Named(kind) => config.prefilter.kind = kind,
-            Self::Boxes(method) => config.posture_method = method,
+            Self::Named(kind, settings) => {
+                config.set_all(settings).expect("settings that exist");
+                config.prefilter.kind = kind;
+            }
+            Self::Boxes(method, settings) => {
+                config.set_all(settings).expect("settings that exist");
+                config.posture_method = method;
+            }
         })
     }
 
     /// Two boxes for one frequency are those of a map that has it everywhere.
     fn for_one_frequency(self, frequency_hz: f32) -> Robot {
         robot(|config| match self {
-            Self::Named(kind) => {
+            Self::Named(kind, settings) => {
+                config.set_all(settings).expect("settings that exist");
                 config.prefilter.kind = kind;
                 config.prefilter.frequency_hz = frequency_hz;
                 config.map = ModeMapConfig::NONE;
             }
-            Self::Boxes(_) => {
+            Self::Boxes(_, settings) => {
+                config.set_all(settings).expect("settings that exist");
                 config.posture_method = PostureMethod::A;
                 config.map = ModeMapConfig::constant(MapNode::new(frequency_hz, DAMPING));
             }
@@ -133,10 +149,10 @@ impl Filter {
     }
 }
 
-/// The frequency that leaves the least in RMS: looked for in steps of 1 Hz over a part of the
-/// moves, then in steps of a quarter over all of them.
+/// The frequency that leaves the least in RMS: looked for in steps of 2 Hz over 20 of the moves,
+/// then in steps of a half over all of them.
 fn best_single(filter: Filter, moves: &[String]) -> (f32, Figures) {
-    let part: Vec<_> = moves.iter().step_by(5).cloned().collect();
+    let part: Vec<_> = moves.iter().step_by(moves.len() / 20).cloned().collect();
     let best_of = |candidates: Vec<f32>, moves: &[String]| {
         candidates
             .into_iter()
@@ -144,9 +160,9 @@ fn best_single(filter: Filter, moves: &[String]) -> (f32, Figures) {
             .min_by(|(_, one), (_, other)| one.rms_mm.total_cmp(&other.rms_mm))
             .expect("there are candidates")
     };
-    let (coarse_hz, _) = best_of((8..=20).map(|hz| hz as f32).collect(), &part);
-    let near = [-0.5, -0.25, 0.0, 0.25, 0.5];
-    best_of(near.map(|off| coarse_hz + off).to_vec(), moves)
+    let (coarse_hz, _) = best_of((4..=10).map(|step| 2.0 * step as f32).collect(), &part);
+    let near = (-3..=3).map(|step| coarse_hz + 0.5 * step as f32);
+    best_of(near.collect(), moves)
 }
 
 /// How many times less is left with the map; prints the row.
@@ -170,51 +186,70 @@ fn gain(filter: Filter, count: usize) -> f64 {
     gain
 }
 
-#[test]
-fn the_map_leaves_five_times_less_than_the_best_single_frequency() {
-    for filter in [
-        Filter::Named(Kind::FirZv),
-        Filter::Boxes(PostureMethod::Hybrid),
-    ] {
-        let gain = gain(filter, 20);
-        assert!(gain > 5.0, "{filter:?}: {gain}");
+fn assert_gains(filters: impl IntoIterator<Item = Filter>, moves: usize, range: Range<f64>) {
+    for filter in filters {
+        let gain = gain(filter, moves);
+        assert!(range.contains(&gain), "{filter:?}: {gain}");
     }
 }
 
-/// Half a minute.
+#[test]
+fn the_map_leaves_five_times_less_than_the_best_single_frequency() {
+    let filters = [
+        Filter::Named(Kind::Zv, JOINTS),
+        Filter::Named(Kind::FirZv, JOINTS),
+        Filter::Boxes(PostureMethod::Hybrid, JOINTS),
+    ];
+    assert_gains(filters, 20, 5.0..40.0);
+}
+
 #[test]
 #[ignore = "long: 100 moves"]
 fn over_a_hundred_moves_the_map_leaves_five_times_less() {
-    for filter in [
-        Filter::Named(Kind::FirZv),
-        Filter::Boxes(PostureMethod::Hybrid),
-    ] {
-        let gain = gain(filter, 100);
-        assert!(gain > 5.0, "{filter:?}: {gain}");
-    }
+    let named = [Kind::Zv, Kind::Zvd, Kind::FirZv, Kind::FirZvd];
+    assert_gains(
+        named.map(|kind| Filter::Named(kind, JOINTS)),
+        100,
+        5.0..40.0,
+    );
+    let boxes = [PostureMethod::A, PostureMethod::Hybrid];
+    assert_gains(
+        boxes.map(|method| Filter::Boxes(method, JOINTS)),
+        100,
+        5.0..40.0,
+    );
 }
 
-/// Half a minute. The published prefilters, and two boxes, gain the most.
 #[test]
 #[ignore = "long: every prefilter"]
 fn the_map_leaves_less_with_every_prefilter() {
-    const PUBLISHED: [Kind; 6] = [
-        Kind::Zv,
-        Kind::Zvd,
-        Kind::Ei,
-        Kind::Fir,
-        Kind::FirZv,
-        Kind::FirZvd,
-    ];
-    let published = PUBLISHED.map(Filter::Named);
-    let boxes = [PostureMethod::A, PostureMethod::B, PostureMethod::Hybrid].map(Filter::Boxes);
-    for filter in published.into_iter().chain(boxes) {
-        let gain = gain(filter, 20);
-        assert!(gain > 1.5, "{filter:?}: {gain}");
-    }
-    let more = [Kind::Mzv, Kind::FirMzv, Kind::Zvdd, Kind::FirEi].map(Filter::Named);
-    for filter in more {
-        let gain = gain(filter, 20);
-        assert!(gain > 1.0, "{filter:?}: {gain}");
-    }
+    use Kind::{Ei, Fir, FirMzv, FirZv, FirZvd, Mzv, ThreeHumpEi, TwoHumpEi, Zv, Zvd, Zvdd};
+    let named = |kind| Filter::Named(kind, JOINTS);
+    let null = [Zv, Zvd, Zvdd, Mzv, FirZv, FirZvd, TwoHumpEi].map(named);
+    let boxes = [PostureMethod::A, PostureMethod::B, PostureMethod::Hybrid];
+    assert_gains(null, 20, 5.0..40.0);
+    assert_gains(
+        boxes.map(|method| Filter::Boxes(method, JOINTS)),
+        20,
+        5.0..40.0,
+    );
+    // One box leaves 2 % of a mode damped by 0.02, however well its frequency is known.
+    assert_gains([Fir, FirMzv].map(named), 20, 3.5..6.0);
+    // EI leaves what it is allowed to of a mode that is known exactly. Allowed 1 % on both sides,
+    // it gains as much as the others.
+    const STRICT: &str = "v-tol=0.01 prefilter2=fir-zv frequency2=35 damping2=0.05";
+    assert_gains([Filter::Named(Ei, STRICT)], 20, 5.0..40.0);
+    assert_gains([named(Ei)], 20, 1.1..2.0);
+    assert_gains([named(ThreeHumpEi)], 20, 0.2..2.0);
+}
+
+/// What the joints' own modes make of it where nothing is done about them: boxes smooth them,
+/// pure shapers do not.
+#[test]
+#[ignore = "long: without a second mode"]
+fn without_a_prefilter_for_the_joints_pure_shapers_gain_less() {
+    let named = |kind| Filter::Named(kind, "");
+    assert_gains([Filter::Boxes(PostureMethod::Hybrid, "")], 20, 5.0..10.0);
+    assert_gains([Kind::FirZv, Kind::FirZvd].map(named), 20, 3.0..5.0);
+    assert_gains([Kind::Zv].map(named), 20, 2.0..3.0);
 }

@@ -10,7 +10,7 @@ use super::zeros::Zeros;
 use crate::limits::BoxRange;
 use crate::path::PathSegment;
 use crate::prefilter::{
-    HALF_SLOTS, Kernel, Kind, Mode, Prefilter, PrefilterConfig, PrefilterError, Stage,
+    HALF_SLOTS, Kernel, Kind, Mode, Prefilter, PrefilterConfig, PrefilterError,
 };
 use crate::units::TICK_S;
 
@@ -60,8 +60,9 @@ impl PostureMethod {
 pub enum Tuning {
     /// A named prefilter for a mode.
     Named(PrefilterConfig),
-    /// Two boxes with zeros at these frequencies in Hz.
-    Boxes([f64; 2]),
+    /// Two boxes with zeros at these frequencies in Hz, and the second mode's prefilter of the
+    /// settings besides.
+    Boxes([f64; 2], PrefilterConfig),
 }
 
 impl Tuning {
@@ -82,9 +83,27 @@ impl Tuning {
     pub(crate) fn make(&self, prefilter: &mut Prefilter) -> Result<(), PrefilterError> {
         match self {
             Self::Named(config) => prefilter.set(config)?,
-            Self::Boxes(zeros_hz) => prefilter.set_boxes(zeros_hz.map(|zero_hz| 1.0 / zero_hz)),
+            Self::Boxes(zeros_hz, besides) => {
+                prefilter.set(besides)?;
+                prefilter.add_boxes(zeros_hz.map(|zero_hz| 1.0 / zero_hz));
+            }
         }
         Ok(())
+    }
+
+    /// Adds to a range the boxes of the prefilter.
+    fn add_boxes(&self, range: &mut BoxRange) {
+        let (config, zeros_hz) = match self {
+            Self::Named(config) => (config, None),
+            Self::Boxes(zeros_hz, besides) => (besides, Some(zeros_hz)),
+        };
+        let mut boxes_s = Prefilter::boxes_of(config);
+        for zero_hz in zeros_hz.into_iter().flatten() {
+            // as in the prefilter itself, there is room
+            let _ = boxes_s.push(1.0 / zero_hz);
+        }
+        boxes_s.sort_unstable_by(|one, other| other.total_cmp(one));
+        range.add(&boxes_s);
     }
 
     /// Whether another one is so near that it leaves no more of the vibration than 0.5 %.
@@ -97,7 +116,7 @@ impl Tuning {
                     && near(one.frequency_hz.into(), other.frequency_hz.into())
                     && libm::fabsf(one.damping - other.damping) <= SAME_DAMPING
             }
-            (Self::Boxes([a, b]), Self::Boxes([c, d])) => near(*a, *c) && near(*b, *d),
+            (Self::Boxes([a, b], _), Self::Boxes([c, d], _)) => near(*a, *c) && near(*b, *d),
             _ => false,
         }
     }
@@ -170,7 +189,8 @@ impl core::error::Error for FollowError {}
 enum Source {
     Named(PrefilterConfig),
     Shortest(Shortest, PrefilterConfig),
-    Boxes(PostureMethod),
+    /// The settings are those of [`Tuning::Boxes`].
+    Boxes(PostureMethod, PrefilterConfig),
 }
 
 /// Settings of a follower.
@@ -256,7 +276,14 @@ impl Follower {
                 (PostureMethod::Local, Some(shortest)) => {
                     Source::Shortest(shortest, config.prefilter)
                 }
-                (method, _) => Source::Boxes(method),
+                (method, _) => Source::Boxes(
+                    method,
+                    PrefilterConfig {
+                        kind: Kind::None,
+                        smoothing_ms: [0.0; 2],
+                        ..config.prefilter
+                    },
+                ),
             },
             reach_s: 0.0,
         });
@@ -272,7 +299,7 @@ impl Follower {
             Source::Shortest(shortest, config) => {
                 named(&of_kind(config, shortest.longest()), &mode)
             }
-            Source::Boxes(_) => Tuning::Boxes([mode.frequency_hz; 2]),
+            Source::Boxes(_, besides) => Tuning::Boxes([mode.frequency_hz; 2], *besides),
         }
     }
 
@@ -320,10 +347,7 @@ impl Follower {
             damping: one.damping.min(other.damping),
         };
         for mode in [slowest, fastest] {
-            self.each_tuning(&mode, |tuning| match tuning {
-                Tuning::Named(config) => range.add(&Prefilter::boxes_of(config)),
-                Tuning::Boxes(zeros_hz) => range.add(&zeros_hz.map(|zero_hz| 1.0 / zero_hz)),
-            });
+            self.each_tuning(&mode, |tuning| tuning.add_boxes(range));
         }
     }
 
@@ -339,7 +363,9 @@ impl Follower {
             Source::Shortest(shortest, config) => shortest
                 .kinds()
                 .for_each(|kind| take(&named(&of_kind(config, kind), mode))),
-            Source::Boxes(_) => take(&Tuning::Boxes([mode.frequency_hz; 2])),
+            Source::Boxes(_, besides) => {
+                take(&Tuning::Boxes([mode.frequency_hz; 2], *besides));
+            }
         }
     }
 
@@ -375,7 +401,7 @@ impl Follower {
             Source::Shortest(shortest, config) => {
                 both_ends(&of_kind(config, shortest.kind(0.0)), step)
             }
-            Source::Boxes(method) => profile(*method, step),
+            Source::Boxes(method, besides) => profile(*method, besides, step),
         }
     }
 
@@ -389,7 +415,7 @@ impl Follower {
                 let off = libm::fabs(course.start.frequency_hz / mode.frequency_hz - 1.0);
                 named(&of_kind(config, shortest.kind(off)), &mode)
             }
-            Source::Boxes(_) => Tuning::Boxes([mode.frequency_hz; 2]),
+            Source::Boxes(_, besides) => Tuning::Boxes([mode.frequency_hz; 2], *besides),
         }
     }
 }
@@ -404,7 +430,7 @@ impl fmt::Display for Follower {
                 config.kind.name()
             ),
             Source::Shortest(shortest, _) => shortest.fmt(f),
-            Source::Boxes(method) => write!(
+            Source::Boxes(method, _) => write!(
                 f,
                 "two boxes for each phase of a move, by method {}",
                 method.name()
@@ -435,7 +461,11 @@ fn check_length(longest: &Tuning) -> Result<(), FollowError> {
 }
 
 /// The boxes of a move; method A's where another one has none.
-fn profile(method: PostureMethod, step: &MoveToFollow) -> (Tuning, Tuning) {
+fn profile(
+    method: PostureMethod,
+    besides: &PrefilterConfig,
+    step: &MoveToFollow,
+) -> (Tuning, Tuning) {
     let course = &step.course;
     let feed_mm_s = course.length_mm / step.duration_s;
     let method = match method {
@@ -456,7 +486,8 @@ fn profile(method: PostureMethod, step: &MoveToFollow) -> (Tuning, Tuning) {
         let is_inside = zeros_hz
             .iter()
             .all(|zero_hz| (low..=high).contains(zero_hz));
-        Tuning::Boxes(if is_inside { zeros_hz } else { [end_hz; 2] })
+        let zeros_hz = if is_inside { zeros_hz } else { [end_hz; 2] };
+        Tuning::Boxes(zeros_hz, *besides)
     };
     (
         inside(zeros.accelerating_hz, course.start.frequency_hz),
@@ -465,55 +496,31 @@ fn profile(method: PostureMethod, step: &MoveToFollow) -> (Tuning, Tuning) {
 }
 
 /// Prefilters for what the mode is, on average in time, while a move accelerates from rest and
-/// while it decelerates to rest.
-///
-/// From rest through a prefilter of length `T` and variance `σ²` the mean distance from the
-/// rest end is
-///
-/// ```text
-/// (1/T) ∫ F I(t) dt = F ((T − m)² + σ²) / (2T) ≈ F (T/8 + σ²/(2T))
-/// ```
-/// and the mode turns by as much as if it were that of there all the time.
+/// while it decelerates to rest: that at the mean way, [`Prefilter::mean_ways_s`]. The mode turns
+/// by as much as if it were that of there all the time.
 fn both_ends(config: &PrefilterConfig, step: &MoveToFollow) -> (Tuning, Tuning) {
     let course = &step.course;
     let feed_mm_s = course.length_mm / step.duration_s;
-    let met = |mode_after: &dyn Fn(f64) -> Mode| {
+    let met = |phase: usize, mode_after: &dyn Fn(f64) -> Mode| {
         let mut tuning = named(config, &mode_after(0.0));
         for _ in 0..2 {
-            let way_s = mean_way_s(&tuning);
+            let way_s = mean_ways_s(&tuning)[phase];
             tuning = named(config, &mode_after(feed_mm_s * way_s));
         }
         tuning
     };
     (
-        met(&|way_mm| course.mode_at(way_mm)),
-        met(&|way_mm| course.mode_at(course.length_mm - way_mm)),
+        met(0, &|way_mm| course.mode_at(way_mm)),
+        met(1, &|way_mm| course.mode_at(course.length_mm - way_mm)),
     )
 }
 
-/// `T/8 + σ²/(2T)`, with the variance of symmetric stages; 0 of a prefilter that cannot be made.
+/// [`Prefilter::mean_ways_s`] of a tuning; 0 of one that cannot be made.
 #[inline(never)]
-fn mean_way_s(tuning: &Tuning) -> f64 {
+fn mean_ways_s(tuning: &Tuning) -> [f64; 2] {
     let mut prefilter = Prefilter::NONE;
-    if tuning.make(&mut prefilter).is_err() {
-        return 0.0;
-    }
-    let length_s = prefilter.length_s();
-    let variance = |stage: &Stage| {
-        let stage_s = stage.length_s();
-        let share = match stage {
-            Stage::Box(_) => 12.0,
-            Stage::Zv(_) => 4.0,
-            Stage::Impulses(_) => 8.0,
-        };
-        stage_s * stage_s / share
-    };
-    let variance: f64 = prefilter.stages().iter().map(variance).sum();
-    if length_s > 0.0 {
-        length_s / 8.0 + variance / (2.0 * length_s)
-    } else {
-        0.0
-    }
+    let made = tuning.make(&mut prefilter);
+    made.map_or([0.0; 2], |()| prefilter.mean_ways_s())
 }
 
 /// The same prefilter for another mode.
@@ -585,30 +592,42 @@ mod tests {
     }
 
     fn follower(prefilter: PrefilterConfig, shortest: Option<ShortestConfig>) -> Follower {
+        follower_by(PostureMethod::Local, prefilter, shortest)
+    }
+
+    fn follower_by(
+        method: PostureMethod,
+        prefilter: PrefilterConfig,
+        shortest: Option<ShortestConfig>,
+    ) -> Follower {
         let map = ModeMapConfig::constant(MapNode::new(8.0, 0.02));
         let mut place = None;
         let config = FollowConfig {
             map: &map,
             prefilter,
             shortest,
-            method: PostureMethod::Local,
+            method,
         };
         Follower::make(&mut place, &config).unwrap();
         place.unwrap()
     }
 
-    fn tunings(follower: &Follower, from_rest: bool) -> [PrefilterConfig; 2] {
-        let step = MoveToFollow {
+    fn step(from_rest: bool) -> MoveToFollow {
+        MoveToFollow {
             course: course(),
             duration_s: 1.0,
             from_rest,
             is_line: true,
             after_arc: false,
-        };
+        }
+    }
+
+    fn tunings(follower: &Follower, from_rest: bool) -> [PrefilterConfig; 2] {
+        let step = step(from_rest);
         let MoveTunings { start, end } = follower.tunings(&step, &follower.slowest());
         [start, end].map(|tuning| match tuning {
             Tuning::Named(config) => config,
-            Tuning::Boxes(_) => panic!("named prefilters are asked for"),
+            Tuning::Boxes(..) => panic!("named prefilters are asked for"),
         })
     }
 
@@ -652,6 +671,43 @@ mod tests {
                 assert_eq!(Prefilter::new(&config).unwrap().boxes_s(), [0.03, 0.012]);
             }
         }
+    }
+
+    #[test]
+    fn two_boxes_leave_nothing_of_the_second_mode_either() {
+        const SECOND_HZ: f64 = 36.6;
+        let second = |frequency_hz| SecondMode {
+            kind: Kind::Zv,
+            frequency_hz,
+            damping: 0.0,
+        };
+        let left_of_second = |frequency_hz: f32| {
+            let follower = follower_by(
+                PostureMethod::A,
+                PrefilterConfig {
+                    second: second(frequency_hz),
+                    ..PrefilterConfig::DEFAULT
+                },
+                None,
+            );
+            let MoveTunings { start, end } = follower.tunings(&step(true), &follower.slowest());
+            let mut range = BoxRange::of(&[0.05, 0.05]);
+            follower.add_boxes(&mut range, &course());
+            assert_eq!((range.shortest_s, range.longest_s), ([0.05; 2], [0.125; 2]));
+            [start, end].map(|tuning| {
+                let mode = Mode {
+                    frequency_hz: SECOND_HZ,
+                    damping: 0.0,
+                };
+                residual(&tuning.prefilter().unwrap(), &mode)
+            })
+        };
+        assert!(
+            left_of_second(SECOND_HZ as f32)
+                .iter()
+                .all(|left| *left < 1e-6)
+        );
+        assert!(left_of_second(0.0).iter().all(|left| *left > 1e-3));
     }
 
     #[test]

@@ -190,15 +190,15 @@ impl Prefilter {
     #[must_use]
     pub fn of_boxes(boxes_s: [f64; 2]) -> Self {
         let mut prefilter = Self::NONE;
-        prefilter.set_boxes(boxes_s);
+        prefilter.add_boxes(boxes_s);
         prefilter
     }
 
-    /// Becomes [`Prefilter::of_boxes`], in its place.
-    pub(crate) fn set_boxes(&mut self, [one_s, other_s]: [f64; 2]) {
-        self.stages.clear();
-        let boxes_s = [one_s.min(other_s), one_s.max(other_s)];
-        self.stages.extend(boxes_s.map(Stage::Box));
+    /// Adds boxes of these lengths in seconds, as far as there is room.
+    pub(crate) fn add_boxes(&mut self, boxes_s: [f64; 2]) {
+        for length_s in boxes_s {
+            self.push(Stage::Box(length_s));
+        }
     }
 
     /// One box, given by its length in seconds: a moving average.
@@ -232,6 +232,26 @@ impl Prefilter {
     #[must_use]
     pub fn reversed_response(&self) -> Response {
         Response::new(&self.stages, true)
+    }
+
+    /// The mean way of a segment that accelerates through this prefilter from rest, over the
+    /// prefilter's length, and of one that decelerates to rest the mean way from its end: each in
+    /// s of travel.
+    ///
+    /// ```text
+    /// (1/T) ∫ I(t) dt = ((T − m)² + σ²) / (2T),   watched from the end (m² + σ²) / (2T)
+    /// ```
+    #[must_use]
+    pub fn mean_ways_s(&self) -> [f64; 2] {
+        let (length_s, mean_s) = (self.length_s(), self.centroid_s());
+        let variance_s2: f64 = self.stages.iter().map(Stage::variance_s2).sum();
+        [length_s - mean_s, mean_s].map(|side_s| {
+            if length_s > 0.0 {
+                (side_s * side_s + variance_s2) / (2.0 * length_s)
+            } else {
+                0.0
+            }
+        })
     }
 
     /// How far the output can be from a point of the input's window, in s of travel: `m` or
