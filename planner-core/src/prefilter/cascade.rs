@@ -101,6 +101,7 @@ impl Prefilter {
                 kind,
                 frequency_hz,
                 damping,
+                axes: _,
             } = config.second;
             (kind, mode(frequency_hz, damping))
         });
