@@ -17,6 +17,7 @@ pub mod limit_use;
 pub mod link;
 pub mod machine;
 pub mod methods;
+pub mod mode_use;
 pub mod oracle;
 pub mod paired_run;
 pub mod payload_search;

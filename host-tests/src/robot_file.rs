@@ -11,7 +11,9 @@ use planner_core::hop::{HopAxes, HopError};
 use planner_core::kinematics::{ArmKind, DeltaConfig, DeltaError, Elbow, JointRange, ScaraError};
 use planner_core::limits::{LimitsConfig, MotionLimits};
 use planner_core::posture::{FollowError, MapError, MapNode, ModeMapConfig, PostureMethod};
-use planner_core::prefilter::{CustomImpulse, Kind, MAX_IMPULSES, PrefilterConfig, PrefilterError};
+use planner_core::prefilter::{
+    AxisSet, CustomImpulse, Kind, MAX_IMPULSES, PrefilterConfig, PrefilterError,
+};
 use planner_core::servo::ServoConfig;
 use serde::{Deserialize, Deserializer};
 
@@ -187,6 +189,7 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
                 _ => vec!["hop.acceleration_mm_s2"],
             },
         },
+        ConfigError::AxesOnMap => vec!["prefilter.axes", "prefilter.mode2.axes"],
         ConfigError::Range { name, .. } => match *name {
             "tolerance" => vec!["motion.corner_tolerance_mm"],
             "overlap" => vec!["motion.corner_overlap_percent"],
@@ -304,6 +307,8 @@ struct PrefilterTable {
     name: Option<Kind>,
     frequency_hz: Option<f32>,
     damping: Option<f32>,
+    #[serde(deserialize_with = "axis_set")]
+    axes: Option<AxisSet>,
     v_tol: Option<f32>,
     box_ms: Option<f32>,
     s_curve_feed_mm_s: Option<f32>,
@@ -327,6 +332,8 @@ struct SecondModeTable {
     name: Option<Kind>,
     frequency_hz: Option<f32>,
     damping: Option<f32>,
+    #[serde(deserialize_with = "axis_set")]
+    axes: Option<AxisSet>,
 }
 
 #[derive(Deserialize)]
@@ -505,6 +512,19 @@ fn hop_axes<'de, D: Deserializer<'de>>(text: D) -> Result<Option<HopAxes>, D::Er
     Ok(Some(axes))
 }
 
+fn axis_set<'de, D: Deserializer<'de>>(text: D) -> Result<Option<AxisSet>, D::Error> {
+    let name = String::deserialize(text)?;
+    let known = || AxisSet::SETS.map(AxisSet::name).join(", ");
+    let unknown = || {
+        format!(
+            "a mode cannot swing along `{name}`: give one of {}",
+            known()
+        )
+    };
+    let axes = AxisSet::from_name(&name).ok_or_else(|| serde::de::Error::custom(unknown()))?;
+    Ok(Some(axes))
+}
+
 #[derive(Deserialize, Default)]
 #[serde(default, deny_unknown_fields)]
 struct ServoTables {
@@ -647,6 +667,7 @@ impl PrefilterTable {
         set(&mut prefilter.kind, self.name);
         set(&mut prefilter.frequency_hz, self.frequency_hz);
         set(&mut prefilter.damping, self.damping);
+        set(&mut prefilter.axes, self.axes);
         set(&mut prefilter.v_tol, self.v_tol);
         set(&mut prefilter.box_ms, self.box_ms);
         set(&mut prefilter.s_curve_feed_mm_s, self.s_curve_feed_mm_s);
@@ -657,6 +678,7 @@ impl PrefilterTable {
         set(&mut prefilter.second.kind, self.mode2.name);
         set(&mut prefilter.second.frequency_hz, self.mode2.frequency_hz);
         set(&mut prefilter.second.damping, self.mode2.damping);
+        set(&mut prefilter.second.axes, self.mode2.axes);
         set(&mut prefilter.impulses, self.impulses);
     }
 }
@@ -835,7 +857,7 @@ mod tests {
     #[test]
     fn a_second_mode_and_a_list_of_impulses() {
         let text = "[prefilter]\nname = 'custom'\nv_tol = 0.1\nsmoothing2_ms = 20\n\
-                    [prefilter.mode2]\nname = '2hump-ei'\nfrequency_hz = 31\ndamping = 0.01\n\
+                    [prefilter.mode2]\nname = '2hump-ei'\nfrequency_hz = 31\ndamping = 0.01\naxes = 'y'\n\
                     [[prefilter.impulses]]\ntime_ms = 0\nweight = 2\n\
                     [[prefilter.impulses]]\ntime_ms = 80\nweight = 1";
         let prefilter = RobotSettings::parse("r.toml", text)
@@ -851,6 +873,8 @@ mod tests {
             (second.kind, second.frequency_hz, second.damping),
             (Kind::TwoHumpEi, 31.0, 0.01)
         );
+        assert_eq!(second.axes, AxisSet::of([false, true, false]));
+        assert_eq!(prefilter.axes, AxisSet::ALL);
         let list = prefilter.impulses.map(|one| (one.time_ms, one.weight));
         assert_eq!(list[..3], [(0.0, 2.0), (80.0, 1.0), (0.0, 0.0)]);
     }
@@ -907,6 +931,14 @@ mod tests {
             (
                 "[prefilter]\nmode2.frequency_hz = 999",
                 "line 2, key prefilter.mode2.frequency_hz: the second mode's",
+            ),
+            (
+                "[prefilter]\naxes = 'yx'",
+                "key prefilter.axes: a mode cannot swing along `yx`: give one of xyz, x, y",
+            ),
+            (
+                "[prefilter]\nautomatic = true\nmode2 = { frequency_hz = 9, axes = 'x' }",
+                "key prefilter.mode2.axes: a mode along some axes only needs a prefilter that",
             ),
             (
                 "[prefilter]\nimpulses = []",

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::checker::Report;
 use crate::limit_use::LimitUse;
+use crate::mode_use::ModeUse;
 use crate::plant::{PayloadConfig, PayloadSample};
 use crate::scenario::{Outcome, Scenario};
 use crate::trace::Trace;
@@ -23,6 +24,8 @@ pub struct Summary {
     pub frequency_hz: f32,
     /// The prefilter's damping ratio.
     pub damping: f32,
+    /// The modes that it is made for, with the axes on which it is.
+    pub modes: Vec<ModeUse>,
     /// Corner tolerance where the program sets none.
     pub tolerance_mm: f32,
     /// `full` or `ideal`.
@@ -143,6 +146,7 @@ impl Summary {
             prefilter: outcome.prefilter.name(),
             frequency_hz: robot.prefilter.frequency_hz,
             damping: robot.prefilter.damping,
+            modes: ModeUse::all(&robot.prefilter),
             tolerance_mm: robot.corner_tolerance_mm,
             plant: scenario.plant.name(),
             on: scenario.machine.name(),

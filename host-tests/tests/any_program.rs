@@ -241,3 +241,22 @@ fn a_chain_of_short_arcs_is_walked_near_its_bound() {
         assert!((-0.05..=most).contains(&slower), "{count} arcs: {slower}");
     }
 }
+
+/// The filter reaches far around the small circle and much of the large one: where the command is
+/// furthest from them depends on both.
+#[test]
+fn the_tolerance_holds_between_a_fast_circle_and_a_small_one() {
+    let program = "G0 X500 Y0\nG2 X500 Y0 I15 F23555\nG2 X500 Y0 I1.829 F2116\n\
+                   G2 X500 Y0 I2.31 F4820\nG1 X500 Y20\n";
+    let robot = robot(|config| {
+        config
+            .set_all(
+                "prefilter=fir-3hump-ei frequency=6 prefilter2=fir-zv frequency2=9 tolerance=0.2",
+            )
+            .expect("these settings exist");
+    });
+    let parsed = Program::parse(program).expect("the checker reads it");
+    let rows = trace(&robot, program);
+    let used = tolerance_use(&parsed, &rows, 0.2, (ROUNDING_MM, 0.0));
+    assert!((0.1..=1.0).contains(&used.strayed), "{used:?}");
+}

@@ -181,6 +181,57 @@ fn no_limit_is_passed_on_a_thousand_random_delta_programs() {
     no_limit_is_passed_on(ArmKind::Delta, 60..1060);
 }
 
+/// With a prefilter for a mode along X and one for a mode along Y or Z, limits give boxes to all
+/// combinations that a move may have.
+#[test]
+fn no_limit_is_passed_where_prefilters_come_and_go_with_the_axes() {
+    let mut binding = 0;
+    for seed in 0..40_u64 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let limits = random_limits(&mut rng, ArmKind::Scara);
+        let kinds = [
+            ["fir-zv", "zv", "none", "s-curve", "ei"][seed as usize % 5],
+            ["zv", "fir", "none", "fir-zv", "zvd"][seed as usize / 4 % 5],
+        ];
+        let robot = robot(|config| {
+            let [first, second] = kinds;
+            let axes2 = if seed % 2 == 0 { "y" } else { "yz" };
+            config
+                .set_all(&format!(
+                    "prefilter={first} frequency=7 axes=x prefilter2={second} frequency2=11 axes2={axes2}"
+                ))
+                .expect("settings that exist");
+            config.limits = limits;
+        });
+        let mut program = String::from("G0 X200 Y0 Z0\n");
+        let mut at = [200.0, 0.0, 0.0];
+        for _ in 0..30 {
+            let axis = rng.random_range(0..4);
+            let way: f64 = rng.random_range(-60.0..60.0);
+            for (place, value) in at.iter_mut().enumerate() {
+                if axis == place || axis == 3 {
+                    let low = [160.0, -80.0, -40.0][place];
+                    let high = [280.0, 80.0, 40.0][place];
+                    *value = (*value + way).clamp(low, high);
+                }
+            }
+            let [x, y, z] = at;
+            let feed = rng.random_range(600.0..20_000.0);
+            program += &format!("G1 X{x:.3} Y{y:.3} Z{z:.3} F{feed:.0}\n");
+            if rng.random_bool(0.3) {
+                program += "G4 P0.01\n";
+            }
+        }
+        let used = used(&robot, &setpoints(&robot, &program), Longest::arc(1.0));
+        assert!(
+            largest(&used) <= SPARE,
+            "seed {seed}, {kinds:?}: {used:?}\n{limits:?}\n{program}"
+        );
+        binding += u32::from(largest(&used) > 0.5);
+    }
+    assert!(binding > 20, "{binding}");
+}
+
 #[test]
 #[ignore = "long; runs with --include-ignored"]
 fn no_limit_is_passed_on_a_thousand_random_programs() {

@@ -12,7 +12,7 @@ use host_tests::robot_file::RobotSettings;
 use host_tests::scenario::{Outcome, Scenario};
 use host_tests::trace::PlantKind;
 use planner_core::prefilter::{
-    Convolver, CustomImpulse, FINE_BITS, Kernel, Kind, Mode, Prefilter, PrefilterConfig,
+    AxisSet, Convolver, CustomImpulse, FINE_BITS, Kernel, Kind, Mode, Prefilter, PrefilterConfig,
     PrefilterError, Response, SecondMode, insensitivity, residual,
 };
 use planner_core::units::{TICK_HZ, TICK_S};
@@ -261,6 +261,7 @@ fn a_second_mode_is_nulled_too() {
             kind: Kind::Zvd,
             frequency_hz: 14.2,
             damping: 0.01,
+            axes: AxisSet::ALL,
         },
         ..config(Kind::FirZv, 6.34, 0.022)
     };
@@ -293,6 +294,7 @@ fn crowded_cascades_have_room_or_are_refused() {
             kind: second_kind,
             frequency_hz: 31.0,
             damping: 0.0,
+            axes: AxisSet::ALL,
         },
         smoothing_ms,
         ..config(kind, 17.0, 0.0)
@@ -327,6 +329,7 @@ proptest! {
                 kind: Kind::ALL[other],
                 frequency_hz: frequency * ratio,
                 damping: other_damping,
+                axes: AxisSet::ALL,
             },
             v_tol,
             smoothing_ms: [smoothing1, smoothing2],
@@ -346,6 +349,7 @@ proptest! {
                 kind: Kind::ALL[other],
                 frequency_hz: 1.7 * frequency,
                 damping,
+                axes: AxisSet::ALL,
             },
             smoothing_ms: [smoothing1, 0.0],
             ..config(Kind::ALL[kind], frequency, damping)

@@ -13,7 +13,9 @@ use crate::posture::{
     FollowConfig, FollowError, Follower, MapNode, ModeMapConfig, PostureMethod, ShortestConfig,
     Tuning,
 };
-use crate::prefilter::{Kernel, Kind, Prefilter, PrefilterConfig, PrefilterError, Response};
+use crate::prefilter::{
+    AxisSet, Kernel, Kind, Prefilter, PrefilterConfig, PrefilterError, Response,
+};
 
 /// Everything that a builder sets.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,6 +95,8 @@ pub enum ConfigError {
     Follow(FollowError),
     /// Pick-and-place moves.
     Hop(HopError),
+    /// Axes of a mode beside a map of the mode or a prefilter that is chosen automatically.
+    AxesOnMap,
     /// A plain number is out of its range.
     Range {
         /// Name of the setting.
@@ -138,6 +142,9 @@ impl fmt::Display for ConfigError {
             Self::Prefilter(error) => error.fmt(f),
             Self::Follow(error) => error.fmt(f),
             Self::Hop(error) => error.fmt(f),
+            Self::AxesOnMap => f.write_str(
+                "a mode along some axes only needs a prefilter that neither follows a map of the mode nor is chosen automatically: leave out either",
+            ),
             Self::Range {
                 name,
                 value,
@@ -164,6 +171,8 @@ pub struct Robot {
     pub follower: Option<Follower>,
     /// What the prefilter in force at the end of the path planned so far is made of.
     pub tuning: Tuning,
+    /// The axes along which the path may go with it: see [`PrefilterConfig::axes`].
+    pub along: AxisSet,
     /// The longest box of the prefilter in s, if it has one.
     pub longest_box_s: Option<f32>,
     /// The prefilter in integer taps.
@@ -198,6 +207,7 @@ impl Robot {
             arm,
             follower: None,
             tuning: Tuning::Named(config.prefilter),
+            along: AxisSet::ALL,
             kernel: Kernel::NONE,
             accelerating: Response::NONE,
             decelerating: Response::NONE,
@@ -214,6 +224,7 @@ impl Robot {
         let tuning = self.take_config(config)?;
         // its taps have been made before: this does not fail
         self.tune(&tuning)?;
+        self.along = AxisSet::ALL;
         Ok(())
     }
 
@@ -228,6 +239,7 @@ impl Robot {
         make_follower(&mut follower, config, &prefilter, config.automatic)?;
         let tuning = first_tuning(&prefilter, follower.as_ref());
         check_tuning(&tuning)?;
+        check_along(config, &arm, &config.prefilter)?;
         // nothing fails from here on
         self.config = *config;
         self.arm = arm;
@@ -252,6 +264,7 @@ impl Robot {
         let mut follower = None;
         let tuning = self.take_follower(&mut follower, config, stays_automatic)?;
         // nothing fails from here on
+        self.along = AxisSet::ALL;
         self.follower = follower;
         self.config.prefilter = *config;
         self.config.automatic = stays_automatic;
@@ -284,11 +297,37 @@ impl Robot {
         make_follower(place, &self.config, &prefilter, automatic)?;
         let tuning = first_tuning(&prefilter, place.as_ref());
         check_tuning(&tuning)?;
+        check_along(&self.config, &self.arm, config)?;
         Ok(tuning)
     }
 
     fn stays_automatic(&self, config: &PrefilterConfig) -> bool {
         self.config.automatic && config.kind == self.config.prefilter.kind
+    }
+
+    /// Goes on with the prefilters that a path along these axes needs: of a mode along other axes
+    /// there is nothing to suppress. Whether that is another prefilter than the one in force.
+    pub fn suit(&mut self, along: AxisSet) -> bool {
+        let config = &self.config.prefilter;
+        if config.modes_along(along) == config.modes_along(self.along) {
+            return false;
+        }
+        // there is none on all axes with a map, and its taps have been made before
+        let is_other = self.tune_along(along).is_ok();
+        if is_other {
+            self.along = along;
+        }
+        is_other
+    }
+
+    #[inline(never)]
+    fn tune_along(&mut self, along: AxisSet) -> Result<(), PrefilterError> {
+        self.tune(&tuning_along(
+            &self.config,
+            &self.arm,
+            &self.config.prefilter,
+            along,
+        ))
     }
 
     /// Goes on with a prefilter of this tuning.
@@ -361,6 +400,34 @@ fn check_tuning(tuning: &Tuning) -> Result<(), PrefilterError> {
     Kernel::new(&prefilter).map(drop)
 }
 
+/// Whether there are taps for the prefilters of all axes along which a path may go.
+#[inline(never)]
+fn check_along(
+    robot: &RobotConfig,
+    arm: &Arm,
+    prefilter: &PrefilterConfig,
+) -> Result<(), PrefilterError> {
+    if prefilter.chooses_axes() {
+        for axes in AxisSet::SETS {
+            check_tuning(&tuning_along(robot, arm, prefilter, axes))?;
+        }
+    }
+    Ok(())
+}
+
+/// What the prefilter for a path along these axes is made of.
+#[inline(never)]
+fn tuning_along(
+    robot: &RobotConfig,
+    arm: &Arm,
+    prefilter: &PrefilterConfig,
+    axes: AxisSet,
+) -> Tuning {
+    let mut prefilter = prefilter.along(axes);
+    add_boxes(&mut prefilter, robot, arm, false);
+    Tuning::Named(prefilter)
+}
+
 /// The arm that the settings describe.
 ///
 /// # Errors
@@ -401,6 +468,9 @@ fn check_ranges(config: &RobotConfig) -> Result<(), ConfigError> {
         }
     }
     config.hop.check()?;
+    if (config.map.is_some() || config.automatic) && config.prefilter.chooses_axes() {
+        return Err(ConfigError::AxesOnMap);
+    }
     check_limits(config)
 }
 
@@ -496,6 +566,7 @@ enum Slot<'a> {
     Elbow(&'a mut Elbow),
     Arm(&'a mut ArmKind),
     HopAxes(&'a mut HopAxes),
+    Axes(&'a mut AxisSet),
     Method(&'a mut PostureMethod),
     Switch(&'a mut bool),
 }
@@ -556,12 +627,13 @@ impl RobotConfig {
             "prefilter",
             "frequency",
             "damping",
+            "axes",
             "v-tol",
             "box-ms",
             "s-curve-feed",
             "s-curve-jerk",
         ],
-        &["prefilter2", "frequency2", "damping2"],
+        &["prefilter2", "frequency2", "damping2", "axes2"],
         &["smoothing1-ms", "smoothing2-ms"],
         &[
             "impulse1-weight",
@@ -640,6 +712,7 @@ impl RobotConfig {
             Slot::Elbow(elbow) => *elbow = named(&ELBOWS, value).ok_or(SettingError::Value)?,
             Slot::Arm(arm) => *arm = named(&ARMS, value).ok_or(SettingError::Value)?,
             Slot::HopAxes(axes) => *axes = HopAxes::from_name(value).ok_or(SettingError::Value)?,
+            Slot::Axes(axes) => *axes = AxisSet::from_name(value).ok_or(SettingError::Value)?,
             Slot::Method(method) => {
                 *method = PostureMethod::from_name(value).ok_or(SettingError::Value)?;
             }
@@ -673,6 +746,9 @@ impl RobotConfig {
             Some(Slot::HopAxes(axes)) => {
                 *axes = HopAxes::ALL.get(value as usize).copied().unwrap_or(*axes);
             }
+            Some(Slot::Axes(axes)) => {
+                *axes = AxisSet::SETS.get(value as usize).copied().unwrap_or(*axes);
+            }
             Some(Slot::Method(method)) => {
                 let all = PostureMethod::ALL;
                 *method = all.get(value as usize).copied().unwrap_or(*method);
@@ -692,6 +768,7 @@ impl RobotConfig {
             Slot::Elbow(elbow) => SettingValue::Name(name_of(&ELBOWS, elbow)),
             Slot::Arm(arm) => SettingValue::Name(name_of(&ARMS, arm)),
             Slot::HopAxes(axes) => SettingValue::Name(axes.name()),
+            Slot::Axes(axes) => SettingValue::Name(axes.name()),
             Slot::Method(method) => SettingValue::Name(method.name()),
             Slot::Switch(switch) => SettingValue::Number(f32::from(u8::from(*switch))),
         })
@@ -739,12 +816,14 @@ impl RobotConfig {
             "delta-parallel-margin" => Slot::Number(&mut self.delta.parallel_margin),
             "frequency" => Slot::Number(&mut prefilter.frequency_hz),
             "damping" => Slot::Number(&mut prefilter.damping),
+            "axes" => Slot::Axes(&mut prefilter.axes),
             "v-tol" => Slot::Number(&mut prefilter.v_tol),
             "box-ms" => Slot::Number(&mut prefilter.box_ms),
             "s-curve-feed" => Slot::Number(&mut prefilter.s_curve_feed_mm_s),
             "s-curve-jerk" => Slot::Number(&mut prefilter.s_curve_jerk_mm_s3),
             "frequency2" => Slot::Number(&mut second.frequency_hz),
             "damping2" => Slot::Number(&mut second.damping),
+            "axes2" => Slot::Axes(&mut second.axes),
             "smoothing1-ms" => Slot::Number(smoothing1_ms),
             "smoothing2-ms" => Slot::Number(smoothing2_ms),
             "impulse1-weight" => Slot::Number(&mut impulse1.weight),

@@ -20,8 +20,12 @@ const CORNERING_WIDTH_S: f32 = 1e-5;
 /// How exactly the crossing of two segments is found, as a fraction of the cornering time.
 const CROSSING_WIDTH: f32 = 1e-3;
 
-/// Samples of the deviation on either side of the crossing, beside an arc.
+/// Samples of the deviation on either side of the crossing, beside an arc; one more for each
+/// radian by which both segments turn within the corner, ...
 const SAMPLES: usize = 2;
+
+/// ... up to so many: small circles after a fast segment.
+const MOST_SAMPLES: usize = 8;
 
 /// What the samples of the deviation are multiplied with, for what lies between them.
 const SAMPLING: f32 = 1.4;
@@ -312,9 +316,12 @@ impl Pair<'_> {
             };
             length(sum(sum(first, second), scaled(along.offset, -1.0)))
         };
+        let turn = self.arriving.turn(self.decelerating, cornering_s)
+            + self.leaving.turn(self.accelerating, cornering_s);
+        let samples = (SAMPLES + turn as usize).min(MOST_SAMPLES);
         let mut beside_mm = 0.0_f32;
-        for i in 1..=SAMPLES {
-            let share = i as f32 / (SAMPLES + 1) as f32;
+        for i in 1..=samples {
+            let share = i as f32 / (samples + 1) as f32;
             let before = at(crossing_s * share);
             let after = at(crossing_s + (cornering_s - crossing_s) * share);
             beside_mm = beside_mm.max(before).max(after);
@@ -368,6 +375,12 @@ struct Point {
 impl Side {
     fn is_line(&self) -> bool {
         self.heading_rate_per_mm == 0.0
+    }
+
+    /// By how many rad its heading turns within `cornering_s`.
+    fn turn(&self, response: &Response, cornering_s: f32) -> f32 {
+        let way_mm = self.feed_mm_s * response.at(cornering_s).1;
+        (self.heading_rate_per_mm * way_mm).abs()
     }
 
     /// The point of the leaving segment `distance_mm` after the corner.

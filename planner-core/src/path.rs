@@ -2,6 +2,7 @@
 
 use crate::kinematics::{Curve, Travel};
 use crate::pose::{AXES, Pose};
+use crate::prefilter::AxisSet;
 
 /// The path of X and Y.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +77,18 @@ impl PathSegment {
     #[must_use]
     pub fn turn_deg(&self) -> f64 {
         self.change()[3]
+    }
+
+    /// The axes along which it goes.
+    #[must_use]
+    pub fn axes(&self) -> AxisSet {
+        let (from, to) = (&self.start, &self.target);
+        let turns = matches!(self.shape, Shape::Arc(_)) || from.c != to.c;
+        AxisSet::of([
+            turns || from.x != to.x,
+            turns || from.y != to.y,
+            from.z != to.z,
+        ])
     }
 
     /// Unit tangents at the start and at the end, and the change of heading in the XY plane

@@ -14,7 +14,7 @@ use crate::limits::{BoxRange, Course, Limited};
 use crate::path::{PathSegment, Shape};
 use crate::pose::{JointPosition, JointUnit, Pose};
 use crate::posture::{MoveToFollow, MoveTunings, Tuning};
-use crate::prefilter::{Kernel, Prefilter, PrefilterConfig};
+use crate::prefilter::{AxisSet, Kernel, Prefilter, PrefilterConfig};
 use crate::queue::{KERNELS_A_MOVE, SegmentProducer};
 use crate::raw::{LONGEST_S, Pace};
 use crate::schedule::{Schedule, Timing};
@@ -177,7 +177,7 @@ impl<'q> Planner<'q> {
     pub fn has_room(&self) -> bool {
         let places = self.schedule.free_places();
         let needed = MAX_ACTIONS_A_LINE + chords::MOST - 1;
-        if self.robot.follower.is_none() {
+        if self.robot.follower.is_none() && !self.robot.config.prefilter.chooses_axes() {
             return places >= needed;
         }
         // a change of the prefilter before each move
@@ -329,6 +329,9 @@ impl<'q> Planner<'q> {
     /// Moves the joints in `duration_s`, to find limit inputs: the position is not known then.
     /// The queue has to be empty.
     pub fn move_joints(&mut self, from: JointPosition, to: JointPosition, duration_s: f64) {
+        if self.robot.suit(AxisSet::ALL) {
+            self.schedule.change_prefilter(&self.robot.kernel);
+        }
         let duration_s = self.joint_move_s(&from, &to, duration_s);
         self.schedule.move_joints(from, to, duration_s);
     }
@@ -400,11 +403,14 @@ impl<'q> Planner<'q> {
         if !self.has_room() {
             return Err(Cause::Full);
         }
+        let other_timings = self.suit_axes(command)?;
+        let changes_prefilter = other_timings.is_some();
+        let timings = other_timings.unwrap_or(timings);
         if command.reference.is_some() {
             self.schedule.reset();
             self.joints = None;
         }
-        let mut queued = false;
+        let mut queued = changes_prefilter && self.schedule.change_prefilter(&self.robot.kernel);
         let mut folded = None;
         let mut limited = None;
         match &command.robot {
@@ -461,6 +467,39 @@ impl<'q> Planner<'q> {
             ended: command.flow == Some(ProgramFlow::End),
             limited,
         })
+    }
+
+    /// Puts the prefilters in force that a command needs on its axes, and yields how long its
+    /// motions take then; nothing where they are in force. The path has to come to rest before
+    /// the command then.
+    ///
+    /// One that is needed is added wherever that is; one that is not needed any more is left
+    /// out only where the path stands anyway.
+    fn suit_axes(&mut self, command: &Command) -> Result<Option<[Timing; 2]>, Cause> {
+        let before = self.robot.along;
+        let along = match (&command.robot, command.moves().next()) {
+            // joints take the tool along all axes, hops have axes of their own
+            (Some(RobotChange::Elbow(_) | RobotChange::Hop(_)), _) => AxisSet::ALL,
+            (_, Some(first)) => {
+                let axes = command.moves().map(|order| order.path.axes());
+                let axes = axes.fold(AxisSet::NONE, AxisSet::with);
+                let from_rest = command.outputs.is_some()
+                    || command.dwell_s.is_some()
+                    || self.schedule.begins_from_rest(first.corner);
+                if from_rest { axes } else { axes.with(before) }
+            }
+            _ => return Ok(None),
+        };
+        if along == AxisSet::NONE || !self.robot.suit(along) {
+            return Ok(None);
+        }
+        match self.timings(&self.robot.arm, command) {
+            Ok(timings) => Ok(Some(timings)),
+            Err(cause) => {
+                self.robot.suit(before);
+                Err(cause)
+            }
+        }
     }
 
     /// Queues a pick-and-place move, with the prefilter that is in force.

@@ -1,5 +1,6 @@
 //! `stillpoint run`: one program, measured.
 
+use std::fmt::Display;
 use std::path::PathBuf;
 
 use anyhow::Result;
@@ -10,6 +11,7 @@ use planner_core::prefilter::Kind;
 use super::output::{Figure, figures, write_files};
 use super::{ScenarioArgs, prefilter_parser};
 use crate::machine::Machine;
+use crate::mode_use::axes_without_prefilter;
 use crate::paired_run::PairedRun;
 use crate::progress::Progress;
 use crate::summary::Summary;
@@ -65,11 +67,26 @@ pub fn execute(args: &RunArgs) -> Result<String> {
         return run.summary.json();
     }
     let mut lines = vec![headline(&run.summary)];
-    if let Some(follower) = Robot::new(&scenario.settings.robot)?.follower {
-        lines.push(format!("  {:22} {follower}", "prefilters"));
+    let robot = Robot::new(&scenario.settings.robot)?;
+    let row = |name: &str, value: &dyn Display| format!("  {name:22} {value}");
+    if let Some(follower) = &robot.follower {
+        lines.push(row("prefilters", follower));
+    }
+    if robot.config.prefilter.chooses_axes() || run.summary.modes.len() > 1 {
+        let modes = ["first mode", "second mode"]
+            .into_iter()
+            .zip(&run.summary.modes);
+        lines.extend(modes.map(|(name, mode)| row(name, mode)));
+        lines.extend(axes_without_prefilter(&robot).into_iter().map(|axis| {
+            let name = format!("along {axis} alone");
+            row(
+                &name,
+                &"no prefilter: its velocity jumps, unless smoothing1_ms gives it a box",
+            )
+        }));
     }
     for Figure { name, value } in figures(&run.summary) {
-        lines.push(format!("  {name:22} {value}"));
+        lines.push(row(name, &value));
     }
     for file in files {
         lines.push(format!("wrote {}", file.display()));

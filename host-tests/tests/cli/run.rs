@@ -313,6 +313,32 @@ fn run_says_what_limits_do_and_draws_them() {
 }
 
 #[test]
+fn run_says_which_modes_act_on_which_axes() {
+    let here = TempDir::new().unwrap();
+    let robot = here.path().join("robot.toml");
+    fs::write(
+        &robot,
+        "prefilter.axes = 'x'\nprefilter.mode2 = { name = 'zv', frequency_hz = 9, axes = 'y' }",
+    )
+    .unwrap();
+    let arguments = ["run", &corner_path(), "--robot", robot.to_str().unwrap()];
+    let output = stillpoint(&arguments).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    for line in [
+        "first mode             fir-zvd for 6.34 Hz, damping 0.022, on moves along x",
+        "second mode            zv for 9 Hz, damping 0, on moves along y",
+        "along z alone          no prefilter",
+    ] {
+        assert!(text.contains(line), "{line}: {text}");
+    }
+    assert!(!text.contains("along x alone") && !text.contains("along y alone"));
+    let summary = json(&[arguments.as_slice(), &["--json"]].concat());
+    assert_eq!(summary["modes"][1]["axes"], "y");
+    // each of the path's lines goes along both, so does its arc
+    assert!((0.4..0.51).contains(&number(&summary, "max_corner_error_mm")));
+}
+
+#[test]
 fn a_delta_runs_its_pick_and_place() {
     let out = TempDir::new().unwrap();
     let robot = programs().join("../robots/delta-800.toml");

@@ -463,6 +463,13 @@ const COMMANDS: &[Row] = &[
         &["$N0=\r\n", "ok"],
     ),
     row(
+        "$axes",
+        "axes along which the first mode swings, `$axes2` the second one",
+        &["$axes=x frequency2=9 axes2=yz"],
+        "$1063",
+        &["$1063=6", "ok"],
+    ),
+    row(
         "$ES",
         "describes the settings",
         NONE,

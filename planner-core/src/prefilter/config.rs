@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::{Kind, MAX_IMPULSES};
+use super::{AxisSet, Kind, MAX_IMPULSES};
 
 /// The residual that EI shapers allow where nothing else is said.
 pub const EI_RESIDUAL: f64 = 0.05;
@@ -16,6 +16,8 @@ pub struct PrefilterConfig {
     pub frequency_hz: f32,
     /// Damping ratio of the mode, 0 to 0.5.
     pub damping: f32,
+    /// The axes along which the mode swings: a move along none of them needs no prefilter for it.
+    pub axes: AxisSet,
     /// `V_tol`, the residual that EI shapers allow, as a fraction: 0.001 to 0.5.
     pub v_tol: f32,
     /// A second mode to suppress, by a prefilter of its own in cascade.
@@ -45,6 +47,8 @@ pub struct SecondMode {
     pub frequency_hz: f32,
     /// Damping ratio, 0 to 0.5.
     pub damping: f32,
+    /// The axes along which it swings, likewise.
+    pub axes: AxisSet,
 }
 
 /// An impulse of a list of one's own.
@@ -78,11 +82,13 @@ impl PrefilterConfig {
             kind: Kind::FirZvd,
             frequency_hz: 6.34,
             damping: 0.022,
+            axes: AxisSet::ALL,
             v_tol: EI_RESIDUAL as f32,
             second: SecondMode {
                 kind: Kind::Zv,
                 frequency_hz: 0.0,
                 damping: 0.0,
+                axes: AxisSet::ALL,
             },
             box_ms: 0.0,
             s_curve_feed_mm_s: 160.0,
@@ -91,6 +97,38 @@ impl PrefilterConfig {
             smoothing_ms: [0.0; 2],
         }
     };
+
+    /// Whether a mode swings along some of the axes only.
+    #[must_use]
+    pub fn chooses_axes(&self) -> bool {
+        let second = &self.second;
+        self.axes != AxisSet::ALL || second.frequency_hz > 0.0 && second.axes != AxisSet::ALL
+    }
+
+    /// Which of both prefilters a path along these axes needs.
+    #[must_use]
+    pub fn modes_along(&self, axes: AxisSet) -> [bool; 2] {
+        let second = &self.second;
+        [
+            self.kind != Kind::None && self.axes.meets(axes),
+            second.frequency_hz > 0.0 && second.axes.meets(axes),
+        ]
+    }
+
+    /// The settings without the prefilters that a path along these axes does not need; what smooths
+    /// a prefilter without boxes stays.
+    #[must_use]
+    pub fn along(&self, axes: AxisSet) -> Self {
+        let [first, second] = self.modes_along(axes);
+        let mut settings = *self;
+        if !first {
+            settings.kind = Kind::None;
+        }
+        if !second {
+            settings.second.frequency_hz = 0.0;
+        }
+        settings
+    }
 
     /// Whether every value is within its range.
     ///
@@ -101,6 +139,7 @@ impl PrefilterConfig {
             kind: _,
             frequency_hz,
             damping,
+            axes: _,
             v_tol,
             second,
             box_ms,

@@ -305,7 +305,7 @@ fn box_changes(length_s: f64) -> [(u16, i32); 5] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Kind, PrefilterConfig, SecondMode, residual};
+    use super::super::{AxisSet, Kind, PrefilterConfig, SecondMode, residual};
     use super::*;
     use proptest::prelude::*;
     use std::vec::Vec as StdVec;
@@ -438,6 +438,7 @@ mod tests {
                     kind: Kind::FirZvdd,
                     frequency_hz: 10.0,
                     damping: 0.0,
+                    axes: AxisSet::ALL,
                 },
                 ..PrefilterConfig::default()
             })

@@ -11,7 +11,7 @@ use super::report::Inputs;
 use crate::config::{RobotConfig, SettingError, SettingValue};
 use crate::hop::HopAxes;
 use crate::posture::PostureMethod;
-use crate::prefilter::Kind as Prefilter;
+use crate::prefilter::{AxisSet, Kind as Prefilter};
 
 /// How the controller deals with its sender and its inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -171,8 +171,18 @@ const HOP_AXES: &[&str] = &{
     names
 };
 
+const AXIS_SETS: &[&str] = &{
+    let mut names = [""; AxisSet::SETS.len()];
+    let mut i = 0;
+    while i < names.len() {
+        names[i] = AxisSet::SETS[i].name();
+        i += 1;
+    }
+    names
+};
+
 /// The table, by number.
-pub const SETTINGS: [Setting; 96] = [
+pub const SETTINGS: [Setting; 98] = [
     setting(
         5,
         "inputs-inverted",
@@ -536,6 +546,14 @@ pub const SETTINGS: [Setting; 96] = [
         decimal(0.001, 10_000.0),
     ),
     setting(
+        1054,
+        "axes",
+        MOTION,
+        "Axes of the mode",
+        "",
+        Kind::Choice(AXIS_SETS),
+    ),
+    setting(
         1060,
         "prefilter2",
         MOTION,
@@ -558,6 +576,14 @@ pub const SETTINGS: [Setting; 96] = [
         "Damping ratio of the second mode",
         "",
         decimal(0.0, 0.5),
+    ),
+    setting(
+        1063,
+        "axes2",
+        MOTION,
+        "Axes of the second mode",
+        "",
+        Kind::Choice(AXIS_SETS),
     ),
     setting(
         1071,
