@@ -20,6 +20,10 @@ use crate::raw::{LONGEST_S, Pace};
 use crate::schedule::{Schedule, Timing};
 use crate::units::{AngleRad, LengthMm, TICK_S};
 
+/// Places in the look-ahead that a line can take, the changes of a prefilter that follows the mode
+/// left out.
+pub const PLACES_A_LINE: usize = MAX_ACTIONS_A_LINE + chords::MOST - 1;
+
 /// What became of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Accepted {
@@ -176,12 +180,11 @@ impl<'q> Planner<'q> {
     #[must_use]
     pub fn has_room(&self) -> bool {
         let places = self.schedule.free_places();
-        let needed = MAX_ACTIONS_A_LINE + chords::MOST - 1;
         if self.robot.follower.is_none() && !self.robot.config.prefilter.chooses_axes() {
-            return places >= needed;
+            return places >= PLACES_A_LINE;
         }
         // a change of the prefilter before each move
-        places >= needed + 2 && self.schedule.free_kernels() >= KERNELS_A_MOVE
+        places >= PLACES_A_LINE + 2 && self.schedule.free_kernels() >= KERNELS_A_MOVE
     }
 
     /// Segments that the look-ahead has room for.

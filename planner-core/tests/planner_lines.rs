@@ -1,9 +1,9 @@
 //! Lines through the planner: what is queued, checked and refused.
 
 use planner_core::config::{Robot, RobotConfig};
-use planner_core::gcode::{Line, MAX_ACTIONS_A_LINE};
+use planner_core::gcode::Line;
 use planner_core::motion::{DelayLines, Motion, MotionState, Order};
-use planner_core::planner::{Accepted, LineError, Planner};
+use planner_core::planner::{Accepted, LineError, PLACES_A_LINE, Planner};
 use planner_core::queue::SegmentQueue;
 
 fn robot() -> Robot {
@@ -106,7 +106,7 @@ fn there_is_room_for_all_that_a_line_can_ask_for() {
             planner.line(line).unwrap();
         }
         let free = planner.free_places();
-        assert!(free < MAX_ACTIONS_A_LINE);
+        assert!(free < PLACES_A_LINE);
         assert_eq!(code(planner.line(b"G0 X300")), 74);
         assert_eq!(planner.free_places(), free);
     });
