@@ -10,6 +10,7 @@ use planner_core::config::{ConfigError, Robot, RobotConfig};
 use planner_core::hop::{HopAxes, HopError};
 use planner_core::kinematics::{ArmKind, DeltaConfig, DeltaError, Elbow, JointRange, ScaraError};
 use planner_core::limits::{LimitsConfig, MotionLimits};
+use planner_core::pose::JointUnit;
 use planner_core::posture::{FollowError, MapError, MapNode, ModeMapConfig, PostureMethod};
 use planner_core::prefilter::{
     AxisSet, CustomImpulse, Kind, MAX_IMPULSES, PrefilterConfig, PrefilterError,
@@ -109,6 +110,8 @@ impl RobotSettings {
                 reason,
             }
         };
+        let joint3 = tables.limits.joint3.check(settings.robot.arm);
+        joint3.map_err(|(key, why)| refused(&[&format!("limits.joint3.{key}")], why))?;
         if let Some(map) = &tables.map {
             settings.robot.map = map
                 .config()
@@ -199,13 +202,13 @@ fn keys_of(error: &ConfigError) -> Vec<&'static str> {
             "uncertainty" => vec!["prefilter.uncertainty"],
             "residual-limit" => vec!["prefilter.residual_limit"],
             "yaw-limit" => vec!["motion.yaw_limit_deg_s"],
-            name => limit_key(name).into_iter().collect(),
+            name => limit_keys(name),
         },
     }
 }
 
-/// The key of a limit's setting: its table, and in it the value of that name.
-fn limit_key(name: &str) -> Option<&'static str> {
+/// The keys of a limit's setting: its table, and in it the values of that name.
+fn limit_keys(name: &str) -> Vec<&'static str> {
     let keys = [
         "limits.joint1.velocity_deg_s",
         "limits.joint1.acceleration_deg_s2",
@@ -216,6 +219,9 @@ fn limit_key(name: &str) -> Option<&'static str> {
         "limits.joint3.velocity_mm_s",
         "limits.joint3.acceleration_mm_s2",
         "limits.joint3.jerk_mm_s3",
+        "limits.joint3.velocity_deg_s",
+        "limits.joint3.acceleration_deg_s2",
+        "limits.joint3.jerk_deg_s3",
         "limits.joint4.velocity_deg_s",
         "limits.joint4.acceleration_deg_s2",
         "limits.joint4.jerk_deg_s3",
@@ -226,9 +232,12 @@ fn limit_key(name: &str) -> Option<&'static str> {
         "limits.axis.acceleration_mm_s2",
         "limits.axis.jerk_mm_s3",
     ];
-    let (part, order) = name.split_once('-')?;
+    let Some((part, order)) = name.split_once('-') else {
+        return Vec::new();
+    };
     let start = format!("limits.{part}.{order}_");
-    keys.into_iter().find(|key| key.starts_with(&start))
+    let found = keys.into_iter().filter(|key| key.starts_with(&start));
+    found.collect()
 }
 
 #[derive(Deserialize, Default)]
@@ -404,7 +413,7 @@ struct HopTable {
 struct LimitsTable {
     joint1: TurnLimitsTable,
     joint2: TurnLimitsTable,
-    joint3: LengthLimitsTable,
+    joint3: Joint3LimitsTable,
     joint4: TurnLimitsTable,
     path: LengthLimitsTable,
     axis: LengthLimitsTable,
@@ -418,6 +427,53 @@ struct TurnLimitsTable {
     jerk_deg_s3: Option<f32>,
 }
 
+/// In mm of a SCARA, in ° of a delta robot.
+#[derive(Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+struct Joint3LimitsTable {
+    velocity_mm_s: Option<f32>,
+    acceleration_mm_s2: Option<f32>,
+    jerk_mm_s3: Option<f32>,
+    velocity_deg_s: Option<f32>,
+    acceleration_deg_s2: Option<f32>,
+    jerk_deg_s3: Option<f32>,
+}
+
+impl Joint3LimitsTable {
+    /// What is given in a unit.
+    fn given(&self, unit: JointUnit) -> [Option<f32>; 3] {
+        match unit {
+            JointUnit::Length => [self.velocity_mm_s, self.acceleration_mm_s2, self.jerk_mm_s3],
+            JointUnit::Angle => [
+                self.velocity_deg_s,
+                self.acceleration_deg_s2,
+                self.jerk_deg_s3,
+            ],
+        }
+    }
+
+    /// Refuses a limit in the unit of the other kind of robot: its key, and why.
+    fn check(&self, kind: ArmKind) -> Result<(), (&'static str, String)> {
+        let (other, keys, why) = match kind {
+            ArmKind::Scara => (
+                JointUnit::Angle,
+                ["velocity_deg_s", "acceleration_deg_s2", "jerk_deg_s3"],
+                "joint 3 of a SCARA goes up and down: give its limits in mm",
+            ),
+            ArmKind::Delta => (
+                JointUnit::Length,
+                ["velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3"],
+                "joint 3 of a delta robot turns: give its limits in deg",
+            ),
+        };
+        let mut wrong = self.given(other).into_iter().zip(keys);
+        match wrong.find(|(value, _)| value.is_some()) {
+            Some((_, key)) => Err((key, why.into())),
+            None => Ok(()),
+        }
+    }
+}
+
 #[derive(Deserialize, Default)]
 #[serde(default, deny_unknown_fields)]
 struct LengthLimitsTable {
@@ -427,7 +483,8 @@ struct LengthLimitsTable {
 }
 
 impl LimitsTable {
-    fn config(&self) -> LimitsConfig {
+    fn config(&self, kind: ArmKind) -> LimitsConfig {
+        let [_, _, unit, _] = kind.joint_units();
         let values = |[velocity, acceleration, jerk]: [Option<f32>; 3]| MotionLimits {
             velocity: velocity.unwrap_or_default(),
             acceleration: acceleration.unwrap_or_default(),
@@ -451,7 +508,7 @@ impl LimitsTable {
             joints: [
                 turn(&self.joint1),
                 turn(&self.joint2),
-                length(&self.joint3),
+                values(self.joint3.given(unit)),
                 turn(&self.joint4),
             ],
             path: length(&self.path),
@@ -636,7 +693,7 @@ impl Tables {
         set(&mut robot.hop.tolerance_mm, hop.tolerance_mm);
         set(&mut robot.hop.acceleration_mm_s2, hop.acceleration_mm_s2);
         set(&mut robot.hop.axes, hop.axes);
-        robot.limits = self.limits.config();
+        robot.limits = self.limits.config(robot.arm);
         let mut plant = self.plant.config(&robot);
         let servo = &self.servo;
         let tables = [&servo.joint1, &servo.joint2, &servo.joint3, &servo.joint4];
@@ -852,6 +909,9 @@ mod tests {
             (5.0, 6.0)
         );
         assert_eq!(limits.axis.acceleration, 7.0);
+        let text = "robot = 'delta'\nlimits.joint3.velocity_deg_s = 8";
+        let limits = RobotSettings::parse("r.toml", text).unwrap().robot.limits;
+        assert_eq!(limits.joints[2].velocity, 8.0);
     }
 
     #[test]
@@ -966,7 +1026,15 @@ mod tests {
             ),
             (
                 "limits.joint3.velocity_deg_s = 1",
-                "key limits.joint3.velocity_deg_s: unknown field",
+                "key limits.joint3.velocity_deg_s: joint 3 of a SCARA goes up and down",
+            ),
+            (
+                "robot = 'delta'\nlimits.joint3.jerk_mm_s3 = 1",
+                "r.toml, line 2, key limits.joint3.jerk_mm_s3: joint 3 of a delta robot turns",
+            ),
+            (
+                "robot = 'delta'\nlimits.joint3.jerk_deg_s3 = -1",
+                "r.toml, line 2, key limits.joint3.jerk_deg_s3: the setting joint3-jerk",
             ),
             (
                 "plant.mode_damping = 2",

@@ -161,6 +161,14 @@ struct ElbowMove {
     duration_s: f64,
 }
 
+/// What a pick-and-place move is planned with.
+struct HopOrder {
+    config: HopConfig,
+    limits: HopLimits,
+    /// The limit that slows it down.
+    limited: Option<Limited>,
+}
+
 impl<'q> Planner<'q> {
     /// A planner that has seen no line; the robot's position is not known yet. What it changes of
     /// the robot it changes in the robot's place.
@@ -508,7 +516,12 @@ impl<'q> Planner<'q> {
     /// Queues a pick-and-place move, with the prefilter that is in force.
     #[inline(never)]
     fn plan_hop(&mut self, order: &HopMove) -> Result<(bool, Option<Limited>), Cause> {
-        let (hop, limited) = self.checked_hop(&self.robot.arm, order)?;
+        let HopOrder {
+            config,
+            limits,
+            limited,
+        } = self.checked_hop(&self.robot.arm, order)?;
+        let hop = self.hop_of(order, &config, &limits).map_err(Cause::Hop)?;
         Ok((self.schedule.hop(&hop, order.line), limited))
     }
 
@@ -711,10 +724,10 @@ impl<'q> Planner<'q> {
         self.robot.check_prefilter(config).map_err(Cause::Prefilter)
     }
 
-    /// A pick-and-place move that the arm can drive: up, across at the top and at the end of the
-    /// vertical parts, and down. Not inlined, as [`Planner::elbow_move`].
+    /// What to plan a pick-and-place move with that the arm can drive: up, across at the top and at
+    /// the end of the vertical parts, and down. Not inlined, as [`Planner::elbow_move`].
     #[inline(never)]
-    fn checked_hop(&self, arm: &Arm, order: &HopMove) -> Result<(Hop, Option<Limited>), Cause> {
+    fn checked_hop(&self, arm: &Arm, order: &HopMove) -> Result<HopOrder, Cause> {
         let own = self.robot.config.hop;
         let wanted = HopConfig {
             height_mm: order.height_mm.unwrap_or(own.height_mm),
@@ -735,8 +748,7 @@ impl<'q> Planner<'q> {
         if duration_s > LONGEST_S {
             return Err(Cause::TooSlow { duration_s });
         }
-        let hop = self.hop_of(order, &wanted, &limits).map_err(Cause::Hop)?;
-        for [start, target] in hop.outline(wanted.height_mm) {
+        for [start, target] in hop::outline(order.start, order.target, &wanted) {
             let line = PathSegment {
                 start,
                 target,
@@ -744,7 +756,11 @@ impl<'q> Planner<'q> {
             };
             arm.check_segment(&line).map_err(Cause::Segment)?;
         }
-        Ok((hop, limited))
+        Ok(HopOrder {
+            config: wanted,
+            limits,
+            limited,
+        })
     }
 
     /// Slows a pick-and-place move down for the limits of motion, and says for which.

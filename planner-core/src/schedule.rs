@@ -166,7 +166,7 @@ impl<'q> Schedule<'q> {
         let (mut rule, mut timing) = (rule, *timing);
         let mut stop = 0;
         if let Some((course, choice)) = &limited {
-            rule = limits.rule(rule, self.run.spare_mm(limits, course));
+            rule = limits.rule(rule, self.run.spare_mm(limits.spare_mm(course)));
             let asked_s = timing.duration_s;
             timing.keep(choice);
             stop = tick_time(f64::from(choice.dwell_s));

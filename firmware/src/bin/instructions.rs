@@ -14,6 +14,7 @@ use planner_core::corner::{self, CornerRule, Side};
 use planner_core::gcode::{Defaults, Interpreter, Line};
 use planner_core::identify::{Record, identify};
 use planner_core::kinematics::ArmKind;
+use planner_core::limits::MotionLimits;
 use planner_core::motion::{DelayLines, Motion, MotionState, Order};
 use planner_core::orientation::Orientation;
 use planner_core::overlap::{Method, Move, Segment, SpeedCurve, ToolPose, ToolState, plan};
@@ -72,6 +73,7 @@ fn main() -> ! {
     programs(&mut bench, filters);
     programs_with_map(&mut bench, filters);
     deltas(&mut bench, filters);
+    limits(&mut bench, filters);
     link(&mut bench, filters);
     corners(&mut bench);
     bench.overlap();
@@ -122,6 +124,34 @@ fn deltas(bench: &mut Bench, filters: &mut DelayLines) {
         let worst = bench.arm(robot, Pose::from_bits(pose));
         bench.print(format_args!("joint-state/{name}"), worst.joint_state);
         bench.print(format_args!("forward/{name}"), worst.forward);
+    }
+}
+
+/// Lines and hops of both robots without limits of motion, and with some that bind.
+#[inline(never)]
+fn limits(bench: &mut Bench, filters: &mut DelayLines) {
+    for (name, arm, program) in [
+        ("scara-lines", ArmKind::Scara, SCARA_LINES),
+        ("scara-arcs", ArmKind::Scara, SCARA_ARCS),
+        ("delta-lines", ArmKind::Delta, DELTA_PROGRAM),
+        ("delta-arcs", ArmKind::Delta, DELTA_ARCS),
+        ("delta-hop", ArmKind::Delta, DELTA_HOP),
+    ] {
+        let mut config = RobotConfig {
+            arm,
+            ..config(Kind::FirZvd, 6.34)
+        };
+        for limits in ["free", "limited"] {
+            let cost = bench.run(&robot_of(config), program, filters, 100);
+            bench.print(format_args!("line/{name}/{limits}"), cost.line);
+            for joint in &mut config.limits.joints[..3] {
+                *joint = MotionLimits {
+                    velocity: 60.0,
+                    acceleration: 400.0,
+                    jerk: 6000.0,
+                };
+            }
+        }
     }
 }
 
@@ -210,6 +240,14 @@ const DELTA_PROGRAM: &str = include_str!("../../../host-tests/programs/delta-pic
 /// Arcs of a delta, two in flight all the time.
 const DELTA_ARCS: &str = "G0 X0 Y0 Z-767\nF9600 G64 P0.5\nG2 X40 Y0 R22\nG3 X80 Y0 R22 Z-750\n\
     G2 X40 Y0 R22\nG3 X0 Y0 R22 Z-767\nM2\n";
+
+/// Lines and arcs of a SCARA.
+const SCARA_LINES: &str = "G0 X160 Y-110\nG1 X290 Y110 F9600\nX160\nX290 Y-110 Z10\nX160\nM2\n";
+const SCARA_ARCS: &str =
+    "G0 X200 Y0\nF9600\nG2 X240 Y0 R22\nG3 X280 Y0 R22 Z10\nG2 X240 Y0 R22\nM2\n";
+
+/// A pick-and-place move of a delta.
+const DELTA_HOP: &str = "G0 X-350 Y0 Z-767\nM103 X350\nM2\n";
 
 /// What the kinematics of a pose cost, in instructions.
 struct ArmCost {

@@ -113,6 +113,27 @@ fn the_tick_stays_below_2500_instructions_while_the_prefilter_changes() {
     }
 }
 
+/// Bounds for three arms along a way cost more than a SCARA's.
+#[test]
+fn limits_cost_a_line_a_millisecond() {
+    let Some(counts) = counts() else { return };
+    for robot in ["scara", "delta"] {
+        for program in ["lines", "arcs"] {
+            let [free, limited] = ["free", "limited"]
+                .map(|limits| counts[&format!("line/{robot}-{program}/{limits}")]);
+            println!("{robot}, {program}: {free} without limits, {limited} with them");
+            assert!(
+                (50_000..190_000).contains(&limited),
+                "{robot}, {program}: {limited}"
+            );
+        }
+    }
+    let [free, limited] =
+        ["free", "limited"].map(|limits| counts[&format!("line/delta-hop/{limits}")]);
+    println!("a hop: {free} without limits, {limited} with them");
+    assert!((1_000_000..7_500_000).contains(&limited), "{limited}");
+}
+
 /// Such a line is a move that lasts longer than its prefilter, 0.1 s and more.
 #[test]
 fn a_line_that_changes_the_prefilter_is_planned_within_three_milliseconds() {

@@ -35,7 +35,7 @@ mod raw;
 
 use core::fmt;
 
-pub use plan::{Hop, HopLimits, HopPeaks, peaks, plan};
+pub use plan::{Hop, HopLimits, HopPeaks, outline, peaks, plan};
 pub use ramp::Ramp;
 pub use raw::RawHop;
 

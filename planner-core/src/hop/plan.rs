@@ -125,23 +125,20 @@ pub struct Hop {
     pub raw: RawHop,
 }
 
-impl Hop {
-    /// Lines around all that the hop passes: up, across at the top, down, and across where the
-    /// lower vertical part ends.
-    #[must_use]
-    pub fn outline(&self, height_mm: f32) -> [[Pose; 2]; 4] {
-        let at = |pose: Pose, z: LengthMm| Pose { z, ..pose };
-        let top = LengthMm::saturating_from_num(self.top_mm);
-        let low = self.start.z.min(self.target.z);
-        let low = low.saturating_add(LengthMm::saturating_from_num(height_mm));
-        let [start, target] = [self.start, self.target];
-        [
-            [start, at(start, top)],
-            [at(start, top), at(target, top)],
-            [at(target, top), target],
-            [at(start, low), at(target, low)],
-        ]
-    }
+/// Lines around all that a hop passes: up, across at the top, down, and across where the lower
+/// vertical part ends.
+#[must_use]
+pub fn outline(start: Pose, target: Pose, config: &HopConfig) -> [[Pose; 2]; 4] {
+    let at = |pose: Pose, z: LengthMm| Pose { z, ..pose };
+    let above = |z: LengthMm, mm: f32| z.saturating_add(LengthMm::saturating_from_num(mm));
+    let top = above(start.z.max(target.z), config.rise_mm);
+    let low = above(start.z.min(target.z), config.height_mm);
+    [
+        [start, at(start, top)],
+        [at(start, top), at(target, top)],
+        [at(target, top), target],
+        [at(start, low), at(target, low)],
+    ]
 }
 
 /// What rounding adds to the acceleration of a raw path: a second difference of three points that
@@ -166,8 +163,8 @@ fn grain(length_mm: f64) -> f32 {
 /// behind the prefilter; with the third, `T↑` the end of *up*, the hop rises as high as it is
 /// said to, and *up* and *down* do not add up to more than the acceleration.
 ///
-/// By the count of its operations some two million instructions on a Cortex-M4F, with a prefilter
-/// of two impulses on all axes; in proportion to the kinks of its response.
+/// 3.3 million instructions on a Cortex-M4F with FIR-ZVD on all axes, and 6.4 million with a second
+/// box; in proportion to the kinks of the response.
 ///
 /// # Errors
 /// [`HopError`] names the value that is out of range.

@@ -17,7 +17,7 @@
 //!
 //! ```text
 //! ‖g‖ = l2 / (l1 s)
-//! ‖H‖ = N / (l1 s),   N = |μ|w/2 + √(μ²w²/4 + (1−μ)w)
+//! ‖H‖ = N / (l1 s),   N = |μ|w/2 + √((μw/2 − 1)² + w − 1)
 //! ‖D‖ ≤ [3 N √((1−μ)² + μ²(w−1)) / (l1 s) + w √(3 + 6μ + l2²/l1²) / l1²] / s
 //! ```
 //!
@@ -37,10 +37,10 @@ use super::scara::MM_PER_LSB;
 use crate::math::sqrt_f32;
 
 /// Pieces into which a long way is divided.
-const PIECES: usize = 8;
+const PIECES: usize = 6;
 
 /// A way is divided into pieces of so much or more.
-const PIECE_MM: f32 = 40.0;
+const PIECE_MM: f32 = 50.0;
 
 /// The least `s²` that a command comes to, as a part of what the serial margin allows: what is
 /// left is for corners, which are rounded inside of the path.
@@ -69,15 +69,15 @@ impl Sweep {
         length_mm: f32,
         curvature_per_mm: f32,
         rise_mm: f32,
-        at: impl Fn(f64) -> [f32; 3],
+        at: impl Fn(f32) -> [f32; 3],
     ) -> Self {
         let pieces = ((length_mm / PIECE_MM) as usize).clamp(1, PIECES);
-        let per = 1.0 / pieces as f64;
+        let per = 1.0 / pieces as f32;
         let mut stations = [[0.0; 3]; PIECES + 1];
         for (station, place) in stations.iter_mut().take(pieces + 1).enumerate() {
-            *place = at(station as f64 * per);
+            *place = at(station as f32 * per);
         }
-        let piece_mm = length_mm * per as f32;
+        let piece_mm = length_mm * per;
         Self {
             stations,
             pieces,
@@ -92,36 +92,44 @@ impl Sweep {
     }
 }
 
-/// Where a piece is, seen from an arm.
-#[derive(Clone, Copy, Debug)]
+/// Where a piece is, seen from an arm, in mm.
+#[derive(Clone, Copy, Debug, Default)]
 struct Span {
-    /// Least and largest `q²`.
+    /// Least and largest q; their squares while they are being found.
     near: f32,
     far: f32,
-    /// Largest `a`.
-    across_mm: f32,
+    /// Largest a.
+    across: f32,
 }
 
 impl Span {
     fn of_place(delta: &DeltaBounds, arm: u8, [x, y, z]: [f32; 3]) -> Self {
         let (ux, uy) = directions_of(arm);
-        let across_mm = x * uy - y * ux;
-        let outward_mm = x * ux + y * uy - delta.offset_mm;
-        let square = outward_mm * outward_mm + across_mm * across_mm + z * z;
+        let across = x * uy - y * ux;
+        let outward = x * ux + y * uy - delta.offset_mm;
+        let square = outward * outward + across * across + z * z;
         Self {
             near: square,
             far: square,
-            across_mm: across_mm.abs(),
+            across: across.abs(),
         }
     }
 
     fn with(self, other: Self) -> Self {
         Self {
-            near: self.near.min(other.near),
-            far: self.far.max(other.far),
-            across_mm: self.across_mm.max(other.across_mm),
+            near: -larger(-self.near, -other.near),
+            far: larger(self.far, other.far),
+            across: larger(self.across, other.across),
         }
     }
+}
+
+/// A sweep as the three arms see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Spans {
+    /// One for each piece, of each arm.
+    arms: [[Span; PIECES]; ARMS],
+    pieces: usize,
 }
 
 /// The shape of the robot, for bounds.
@@ -151,9 +159,13 @@ impl DeltaBounds {
     /// bounds hold, in mm.
     #[must_use]
     pub fn spare_mm(&self, sweep: &Sweep) -> f32 {
-        let mut least = f32::INFINITY;
-        self.each_span(sweep, |_, span| {
-            least = least.min(self.least_squared(span, sweep.bent_mm).0);
+        let spans = self.spans(sweep);
+        let all = spans
+            .arms
+            .iter()
+            .flat_map(|arm| arm.iter().take(spans.pieces));
+        let least = all.fold(f32::INFINITY, |least, span| {
+            least.min(self.least_squared(span, 0.0).0)
         });
         let spare_mm = (least.max(self.programmed) - self.floor) / self.steepest_mm;
         spare_mm.min(STRAY * self.upper_arm_mm)
@@ -163,50 +175,56 @@ impl DeltaBounds {
     /// everywhere.
     ///
     /// Exact for g and H where the region is a point, and D there at most twice what it has to be.
-    /// Cost on a Cortex-M4F: some 900 instructions a piece, of which a way has up to 8.
+    /// Cost on a Cortex-M4F: some 1800 instructions a piece, of which a way has up to 6.
     #[must_use]
-    pub fn within(&self, sweep: &Sweep, reach_mm: f32) -> [RateBounds; ARMS] {
-        let mut bounds = [RateBounds::default(); ARMS];
-        let reach_mm = reach_mm + sweep.bent_mm;
-        self.each_span(sweep, |arm, span| {
-            let (squared, ends) = self.least_squared(span, reach_mm);
-            if let Some(bound) = bounds.get_mut(usize::from(arm) - 1) {
-                *bound = bound.larger(self.norms(squared.max(self.floor), ends));
-            }
-        });
-        bounds
+    pub fn within(&self, spans: &Spans, reach_mm: f32) -> [RateBounds; ARMS] {
+        spans.arms.each_ref().map(|arm| {
+            let pieces = arm.iter().take(spans.pieces);
+            pieces.fold(RateBounds::default(), |bound, span| {
+                let (squared, ends) = self.least_squared(span, reach_mm);
+                bound.larger(self.norms(larger(squared, self.floor), ends))
+            })
+        })
     }
 
-    /// Shows each piece as each arm, 1 to 3, sees it.
-    #[inline(never)]
-    fn each_span(&self, sweep: &Sweep, mut show: impl FnMut(u8, &Span)) {
-        for arm in 1..=3 {
-            let mut before: Option<(Span, [f32; 3])> = None;
-            for place in sweep.stations() {
-                let [x, y, z] = *place;
-                let low = Span::of_place(self, arm, *place);
-                let high = Span::of_place(self, arm, [x, y, z + sweep.rise_mm]);
-                let here = low.with(high);
-                if let Some((span, [x0, y0, z0])) = before {
-                    let mut span = span.with(here);
-                    // between the ends of a chord, q² is up to a quarter of its square less
-                    let way = [x - x0, y - y0, z - z0, sweep.rise_mm];
-                    let squares: f32 = way.iter().map(|way| way * way).sum();
-                    span.near -= 0.25 * squares;
-                    show(arm, &span);
+    /// A sweep as the arms see it.
+    #[must_use]
+    pub fn spans(&self, sweep: &Sweep) -> Spans {
+        let mut spans = Spans {
+            arms: [[Span::default(); PIECES]; ARMS],
+            pieces: sweep.pieces,
+        };
+        for (arm, spans) in (1..).zip(&mut spans.arms) {
+            let seen = |[x, y, z]: [f32; 3]| {
+                let low = Span::of_place(self, arm, [x, y, z]);
+                if sweep.rise_mm == 0.0 {
+                    return low;
                 }
-                before = Some((here, *place));
+                low.with(Span::of_place(self, arm, [x, y, z + sweep.rise_mm]))
+            };
+            let ends = sweep.stations().zip(sweep.stations().skip(1));
+            for (span, (from, to)) in spans.iter_mut().zip(ends) {
+                *span = seen(*from).with(seen(*to));
+                // between the ends of a chord, q² is up to a quarter of its square less
+                let mut squares = sweep.rise_mm * sweep.rise_mm;
+                for (from, to) in from.iter().zip(to) {
+                    squares += (to - from) * (to - from);
+                }
+                span.near = sqrt_f32((span.near - 0.25 * squares).max(0.0)) - sweep.bent_mm;
+                span.far = sqrt_f32(span.far) + sweep.bent_mm;
+                span.across += sweep.bent_mm;
             }
         }
+        spans
     }
 
     /// The least `s²` within a reach of a piece, and the ends of μ there.
     fn least_squared(&self, span: &Span, reach_mm: f32) -> (f32, [f32; 2]) {
         let shortest_mm = (self.forearm_mm - self.upper_arm_mm).abs();
         let longest_mm = self.forearm_mm + self.upper_arm_mm;
-        let near_mm = (sqrt_f32(span.near.max(0.0)) - reach_mm).clamp(shortest_mm, longest_mm);
-        let far_mm = (sqrt_f32(span.far) + reach_mm).clamp(shortest_mm, longest_mm);
-        let across_mm = span.across_mm + reach_mm;
+        let near_mm = (span.near - reach_mm).clamp(shortest_mm, longest_mm);
+        let far_mm = (span.far + reach_mm).clamp(shortest_mm, longest_mm);
+        let across_mm = span.across + reach_mm;
         let per = 0.5 / self.upper_arm_mm;
         let [near, far] = [near_mm, far_mm].map(|distance_mm| {
             let square = distance_mm * distance_mm;
@@ -215,34 +233,42 @@ impl DeltaBounds {
             let rounding = 5e-7 * (square + along_mm * along_mm);
             (square - along_mm * along_mm - rounding, along_mm)
         });
-        let squared = near.0.min(far.0) - across_mm * across_mm;
+        let squared = -larger(-near.0, -far.0) - across_mm * across_mm;
         (squared, [near.1, far.1].map(|along| along * 2.0 * per))
     }
 
     /// The norms where `s²` is at least `squared` and μ between the ends.
     fn norms(&self, squared: f32, ends: [f32; 2]) -> RateBounds {
-        let root_mm = sqrt_f32(squared);
-        let (per_root, per_arm) = (1.0 / root_mm, 1.0 / self.upper_arm_mm);
+        let (per_root, per_arm) = (1.0 / sqrt_f32(squared), 1.0 / self.upper_arm_mm);
         let ratio = self.forearm_mm * per_root;
-        let w = (ratio * ratio).max(1.0);
-        let (mut bend, mut turn) = (0.0_f32, 0.0_f32);
-        for mu in ends {
+        let w = larger(ratio * ratio, 1.0);
+        let [low, high] = ends;
+        // N is least at μ = 0
+        let bend = |mu: f32| {
             let half = 0.5 * mu * w;
-            let root = sqrt_f32((half * half + (1.0 - mu) * w).max(0.0));
-            bend = bend.max(half.abs() + root);
-            turn = turn.max((1.0 - mu) * (1.0 - mu) + mu * mu * (w - 1.0));
-        }
+            half.abs() + sqrt_f32((half - 1.0) * (half - 1.0) + (w - 1.0))
+        };
+        let bend = match (low < 0.0, high > 0.0) {
+            (true, true) => larger(bend(low), bend(high)),
+            (true, false) => bend(low),
+            (false, _) => bend(high),
+        };
+        let turn = |mu: f32| (1.0 - mu) * (1.0 - mu) + mu * mu * (w - 1.0);
+        let turn = sqrt_f32(larger(turn(low), turn(high)));
         let lengths = self.forearm_mm * per_arm;
-        let highest = ends[0].max(ends[1]);
-        let rest = (3.0 + 6.0 * highest + lengths * lengths).max(0.0);
+        let rest = sqrt_f32(larger(3.0 + 6.0 * high + lengths * lengths, 0.0));
         let per_both = per_root * per_arm;
-        let twist = 3.0 * bend * sqrt_f32(turn) * per_both;
         RateBounds {
             first: ratio * per_arm,
             second: bend * per_both,
-            third: (twist + w * sqrt_f32(rest) * per_arm * per_arm) * per_root,
+            third: (3.0 * bend * turn * per_both + w * rest * per_arm * per_arm) * per_root,
         }
     }
+}
+
+/// The larger of two numbers: without the call that `f32::max` is on a Cortex-M4F.
+pub(super) fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 impl Delta {

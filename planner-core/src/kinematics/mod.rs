@@ -22,7 +22,7 @@ mod segment_check;
 pub use arm::{Arm, ArmBounds, ArmKind};
 pub use config::{Elbow, JointRange, ScaraConfig, ScaraError};
 pub use delta::Delta;
-pub use delta_bounds::{DeltaBounds, Sweep};
+pub use delta_bounds::{DeltaBounds, Spans, Sweep};
 pub use delta_config::{DeltaConfig, DeltaError};
 pub use pose_check::PoseError;
 pub use rate_bounds::{RateBounds, Ring, RingBounds};

@@ -24,6 +24,7 @@
 //! so that over an interval each is largest at one of its ends: a test shows it for arms with
 //! links of 1 : 10 to 10 : 1.
 
+use super::delta_bounds::larger;
 use super::scara::{MM_PER_LSB, Scara};
 use crate::math::{ONE_Q30, sin_cos, sqrt_f32, turns};
 use crate::units::AngleRad;
@@ -42,9 +43,9 @@ pub struct RateBounds {
 impl RateBounds {
     pub(super) fn larger(self, other: Self) -> Self {
         Self {
-            first: self.first.max(other.first),
-            second: self.second.max(other.second),
-            third: self.third.max(other.third),
+            first: larger(self.first, other.first),
+            second: larger(self.second, other.second),
+            third: larger(self.third, other.third),
         }
     }
 }

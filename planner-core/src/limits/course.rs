@@ -57,9 +57,19 @@ impl Course {
             Shape::Arc(_) => [plane_mm, plane_mm, z_mm],
         };
         let region = match (kind, path.shape) {
-            (ArmKind::Delta, _) => {
+            (ArmKind::Delta, Shape::Line) => {
+                let [way_x, way_y, way_z] = [0, 1, 2].map(|axis: usize| end[axis] - start[axis]);
+                Region::Sweep(Sweep::new(length_mm, 0.0, 0.0, |u| {
+                    [
+                        start[0] + u * way_x,
+                        start[1] + u * way_y,
+                        start[2] + u * way_z,
+                    ]
+                }))
+            }
+            (ArmKind::Delta, Shape::Arc(_)) => {
                 Region::Sweep(Sweep::new(length_mm, curvature_per_mm, 0.0, |u| {
-                    let [x, y, z, _] = at(u);
+                    let [x, y, z, _] = at(f64::from(u));
                     [x, y, z]
                 }))
             }

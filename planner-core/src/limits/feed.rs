@@ -5,7 +5,7 @@ use super::config::{Bound, LimitsConfig, MotionLimits, Order, Part};
 use super::course::{Course, Region};
 use crate::config::RobotConfig;
 use crate::corner::CornerRule;
-use crate::kinematics::{Arm, ArmBounds, ArmKind, RateBounds, Ring};
+use crate::kinematics::{Arm, ArmBounds, ArmKind, RateBounds, Ring, Spans};
 use crate::math::sqrt_f32;
 use crate::prefilter::{Kind, Prefilter, PrefilterConfig};
 use crate::units::TICK_S;
@@ -335,15 +335,16 @@ impl Limits {
     /// the limit that sets it; 0 if the segment may take half of `asked_s`.
     ///
     /// At most 0.5 % longer than need be, mostly. Cost on a Cortex-M4F: below 20 000 instructions
-    /// for a SCARA, 80 000 for a delta robot.
+    /// for a SCARA, 50 000 for a delta robot.
     #[must_use]
     pub fn least_s(&self, course: &Course, asked_s: f32) -> (f32, Option<Bound>) {
         if !self.is_set {
             return (0.0, None);
         }
         let yaw_s = self.yaw_s(course);
+        let place = self.place(&course.region);
         let hurried_s = 0.5 * asked_s - yaw_s;
-        let (overload, mut bound) = self.overload(course, hurried_s);
+        let (overload, mut bound) = self.overload(course, &place, hurried_s);
         if overload <= 1.0 {
             return (0.0, None);
         }
@@ -351,18 +352,28 @@ impl Limits {
         if low_s > 0.0 {
             high_s = low_s * overload;
         }
+        let (mut above, mut below) = ((low_s, overload), None);
         for _ in 0..ROUNDS {
             if high_s <= low_s * CLOSE {
                 break;
             }
             let middle_s = match (low_s > 0.0, high_s.is_finite()) {
+                // where the bounds cost more: overloads grow little faster than the speed
+                (true, true) if self.kind() == ArmKind::Delta => {
+                    below.map_or(high_s, |below| between(above, below).clamp(low_s, high_s))
+                }
                 (true, true) => sqrt_f32(low_s * high_s),
                 (false, true) => 0.5 * high_s,
                 // any duration serves to begin with
                 (_, false) => asked_s,
             };
-            let (overload, by) = self.overload(course, middle_s);
+            let (overload, by) = self.overload(course, &place, middle_s);
             bound = by;
+            if overload > 1.0 {
+                above = (middle_s, overload);
+            } else {
+                below = Some((middle_s, overload));
+            }
             // Overloads grow at least as the speed does: a duration times its overload keeps the
             // limits if that is above 1, and does not if it is below.
             let scaled_s = middle_s * overload;
@@ -383,7 +394,7 @@ impl Limits {
 
     /// The largest quotient of what a segment that takes `duration_s` may make of something, and
     /// the limit of that; infinite without a duration.
-    fn overload(&self, course: &Course, duration_s: f32) -> (f32, Option<Bound>) {
+    fn overload(&self, course: &Course, place: &Place, duration_s: f32) -> (f32, Option<Bound>) {
         if duration_s <= 0.0 {
             return (f32::INFINITY, None);
         }
@@ -424,7 +435,7 @@ impl Limits {
         take(largest(Part::Joint(joint), boxes.linear(&alone, highest)));
         let load = load(way_mm);
         let reach_mm = load.jerk.min(self.fastest_mm_s) * self.reach_s;
-        let bounds = self.bounds(&course.region, reach_mm);
+        let bounds = self.bounds(place, reach_mm);
         for ((joint, highest), bounds) in turning.into_iter().zip(&bounds) {
             take(largest(
                 Part::Joint(joint),
@@ -434,19 +445,44 @@ impl Limits {
         worst
     }
 
-    /// Bounds for the joints that the tool turns, wherever it is so near a region: 1, 2 and their
-    /// sum of a SCARA, 1 to 3 of a delta robot.
-    pub(super) fn bounds(&self, region: &Region, reach_mm: f32) -> [RateBounds; 3] {
+    /// A region as bounds are computed from it.
+    pub(super) fn place(&self, region: &Region) -> Place {
         match (&self.arm, region) {
-            (ArmBounds::Scara(arm), Region::Ring(ring)) => arm.within(Ring {
+            (ArmBounds::Delta(arm), Region::Sweep(sweep)) => Place::Spans(arm.spans(sweep)),
+            (_, Region::Ring(ring)) => Place::Ring(*ring),
+            // a course is made for the robot's kind
+            (ArmBounds::Scara(arm), Region::Sweep(_)) => Place::Ring(arm.programmed()),
+        }
+    }
+
+    /// Bounds for the joints that the tool turns, wherever it is so near a place: 1, 2 and their
+    /// sum of a SCARA, 1 to 3 of a delta robot.
+    pub(super) fn bounds(&self, place: &Place, reach_mm: f32) -> [RateBounds; 3] {
+        match (&self.arm, place) {
+            (ArmBounds::Scara(arm), Place::Ring(ring)) => arm.within(Ring {
                 inner_mm: ring.inner_mm - reach_mm,
                 outer_mm: ring.outer_mm + reach_mm,
             }),
-            (ArmBounds::Delta(arm), Region::Sweep(sweep)) => arm.within(sweep, reach_mm),
-            // a course is made for the robot's kind
+            (ArmBounds::Delta(arm), Place::Spans(spans)) => arm.within(spans, reach_mm),
+            // a place is made for the robot's kind
             _ => [RateBounds::default(); 3],
         }
     }
+}
+
+/// Where an overload is about 1, between durations where it is above that and no more than that: on
+/// a straight line in their logarithms, for which the bits of a float do well enough.
+fn between((above_s, above): (f32, f32), (below_s, below): (f32, f32)) -> f32 {
+    let logarithm = |value: f32| value.to_bits() as f32;
+    let share = (logarithm(above) - logarithm(1.0)) / (logarithm(above) - logarithm(below));
+    let way = logarithm(below_s) - logarithm(above_s);
+    f32::from_bits((logarithm(above_s) + share * way) as u32)
+}
+
+/// Where a segment is, as bounds on the joints are computed from it.
+pub(super) enum Place {
+    Ring(Ring),
+    Spans(Spans),
 }
 
 /// The largest of the quotients for velocity, acceleration and jerk.

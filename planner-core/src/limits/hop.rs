@@ -65,12 +65,11 @@ impl Limits {
                 let low_mm = z0.min(z1);
                 let rise_mm = (top.to_num::<f32>() - low_mm).max(0.0);
                 Region::Sweep(Sweep::new(length_mm, 0.0, rise_mm, |u| {
-                    let u = u as f32;
                     [x0 + u * dx, y0 + u * dy, low_mm]
                 }))
             }
         };
-        let bounds = self.bounds(&region, 0.0);
+        let bounds = self.bounds(&self.place(&region), 0.0);
         let per_mm = if length_mm > 0.0 {
             1.0 / length_mm
         } else {

@@ -87,12 +87,12 @@ impl Run {
         }
     }
 
-    /// How far from the segments beside the next corner a command may stray, in mm.
-    #[must_use]
-    pub fn spare_mm(&self, limits: &Limits, course: &Course) -> f32 {
-        let own_mm = limits.spare_mm(course);
+    /// How far from the segments beside the next corner a command may stray, in mm, when the one
+    /// behind it leaves `own_mm`. To be asked once for each segment.
+    pub fn spare_mm(&mut self, own_mm: f32) -> f32 {
+        let before_mm = core::mem::replace(&mut self.spare_mm, own_mm);
         match self.last_tangent {
-            Some(_) => own_mm.min(self.spare_mm),
+            Some(_) => own_mm.min(before_mm),
             None => own_mm,
         }
     }
@@ -132,7 +132,6 @@ impl Run {
             }
         }
         self.last_tangent = Some(course.last_tangent);
-        self.spare_mm = limits.spare_mm(course);
     }
 
     /// `|u₂ − u₁|` at the corner before a segment, in space or, where joints move as the tool does

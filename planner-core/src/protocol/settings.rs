@@ -862,7 +862,7 @@ pub const SETTINGS: [Setting; 98] = [
         "joint3-velocity",
         LIMITS,
         "Joint 3 velocity, 0 unlimited",
-        "mm/s",
+        "mm/s or deg/s",
         decimal(0.0, 1e6),
     ),
     setting(
@@ -870,7 +870,7 @@ pub const SETTINGS: [Setting; 98] = [
         "joint3-acceleration",
         LIMITS,
         "Joint 3 acceleration, 0 unlimited",
-        "mm/s2",
+        "mm/s2 or deg/s2",
         decimal(0.0, 1e7),
     ),
     setting(
@@ -878,7 +878,7 @@ pub const SETTINGS: [Setting; 98] = [
         "joint3-jerk",
         LIMITS,
         "Joint 3 jerk, 0 unlimited",
-        "mm/s3",
+        "mm/s3 or deg/s3",
         decimal(0.0, 1e9),
     ),
     setting(
