@@ -10,7 +10,7 @@ use super::zeros::Zeros;
 use crate::limits::BoxRange;
 use crate::path::PathSegment;
 use crate::prefilter::{
-    HALF_SLOTS, Kernel, Kind, Mode, Prefilter, PrefilterConfig, PrefilterError,
+    HALF_SLOTS, Kernel, Kind, Mode, Prefilter, PrefilterConfig, PrefilterError, add_box_s,
 };
 use crate::units::TICK_S;
 
@@ -99,10 +99,8 @@ impl Tuning {
         };
         let mut boxes_s = Prefilter::boxes_of(config);
         for zero_hz in zeros_hz.into_iter().flatten() {
-            // as in the prefilter itself, there is room
-            let _ = boxes_s.push(1.0 / zero_hz);
+            add_box_s(&mut boxes_s, 1.0 / zero_hz);
         }
-        boxes_s.sort_unstable_by(|one, other| other.total_cmp(one));
         range.add(&boxes_s);
     }
 
@@ -326,7 +324,9 @@ impl Follower {
         };
         let mut longest_s = 0.0_f64;
         for mode in [most, none] {
-            self.each_tuning(&mode, |tuning| longest_s = longest_s.max(reach_s(tuning)));
+            self.each_tuning(&mode, &mut |tuning| {
+                longest_s = longest_s.max(reach_s(tuning));
+            });
         }
         longest_s as f32
     }
@@ -347,17 +347,18 @@ impl Follower {
             damping: one.damping.min(other.damping),
         };
         for mode in [slowest, fastest] {
-            self.each_tuning(&mode, |tuning| tuning.add_boxes(range));
+            self.each_tuning(&mode, &mut |tuning| tuning.add_boxes(range));
         }
     }
 
     /// Every kind of tuning that a move can get, for the map's slowest mode.
-    pub(crate) fn each_slowest(&self, take: impl FnMut(&Tuning)) {
+    pub(crate) fn each_slowest(&self, take: &mut dyn FnMut(&Tuning)) {
         self.each_tuning(&self.map.slowest(), take);
     }
 
     /// The same for a mode.
-    fn each_tuning(&self, mode: &Mode, mut take: impl FnMut(&Tuning)) {
+    #[inline(never)]
+    fn each_tuning(&self, mode: &Mode, take: &mut dyn FnMut(&Tuning)) {
         match &self.source {
             Source::Named(config) => take(&named(config, mode)),
             Source::Shortest(shortest, config) => shortest

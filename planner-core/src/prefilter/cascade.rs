@@ -301,6 +301,13 @@ impl Prefilter {
     }
 }
 
+/// Adds a length to those of boxes, the longest first, if there is room.
+pub(crate) fn add_box_s(boxes_s: &mut Vec<f64, MAX_STAGES>, length_s: f64) {
+    let longer = boxes_s.iter().take_while(|other| **other >= length_s);
+    let place = longer.count();
+    let _ = boxes_s.insert(place, length_s);
+}
+
 /// The kind for each mode that the settings name.
 fn parts(config: &PrefilterConfig) -> impl Iterator<Item = (Kind, Mode)> {
     let mode = |frequency_hz: f32, damping: f32| Mode {

@@ -15,6 +15,7 @@ mod residual;
 mod response;
 mod shapers;
 
+pub(crate) use cascade::add_box_s;
 pub use cascade::{MAX_STAGES, Prefilter, Stage};
 pub use config::{CustomImpulse, EI_RESIDUAL, PrefilterConfig, PrefilterError, SecondMode};
 pub use convolver::{Convolver, ConvolverPair, FINE_BITS};
