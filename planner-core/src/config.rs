@@ -377,7 +377,7 @@ impl Robot {
         };
         look(&self.tuning);
         if let Some(follower) = &self.follower {
-            follower.each_slowest(look);
+            follower.each_slowest(&mut look);
         }
         added_s.into_iter().flatten()
     }

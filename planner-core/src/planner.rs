@@ -611,6 +611,7 @@ impl<'q> Planner<'q> {
             from_rest,
             is_line: matches!(order.path.shape, Shape::Line),
             after_arc: !from_rest && self.schedule.follows_arc(),
+            in_force_s: self.robot.accelerating.length_s().into(),
         };
         let MoveTunings { start, end } = follower.tunings(&step, &self.robot.tuning);
         if !start.is_near(&self.robot.tuning) && self.robot.tune(&start).is_ok() {

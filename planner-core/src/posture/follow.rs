@@ -10,7 +10,7 @@ use super::zeros::Zeros;
 use crate::limits::BoxRange;
 use crate::path::PathSegment;
 use crate::prefilter::{
-    HALF_SLOTS, Kernel, Kind, Mode, Prefilter, PrefilterConfig, PrefilterError,
+    HALF_SLOTS, Kernel, Kind, Mode, Prefilter, PrefilterConfig, PrefilterError, Stage, add_box_s,
 };
 use crate::units::TICK_S;
 
@@ -99,10 +99,8 @@ impl Tuning {
         };
         let mut boxes_s = Prefilter::boxes_of(config);
         for zero_hz in zeros_hz.into_iter().flatten() {
-            // as in the prefilter itself, there is room
-            let _ = boxes_s.push(1.0 / zero_hz);
+            add_box_s(&mut boxes_s, 1.0 / zero_hz);
         }
-        boxes_s.sort_unstable_by(|one, other| other.total_cmp(one));
         range.add(&boxes_s);
     }
 
@@ -150,6 +148,8 @@ pub struct MoveToFollow {
     pub is_line: bool,
     /// Whether an arc before it still is in flight when it begins.
     pub after_arc: bool,
+    /// How long the prefilter in force is, in seconds.
+    pub in_force_s: f64,
 }
 
 /// Why there is no following the map.
@@ -326,7 +326,9 @@ impl Follower {
         };
         let mut longest_s = 0.0_f64;
         for mode in [most, none] {
-            self.each_tuning(&mode, |tuning| longest_s = longest_s.max(reach_s(tuning)));
+            self.each_tuning(&mode, &mut |tuning| {
+                longest_s = longest_s.max(reach_s(tuning));
+            });
         }
         longest_s as f32
     }
@@ -347,17 +349,18 @@ impl Follower {
             damping: one.damping.min(other.damping),
         };
         for mode in [slowest, fastest] {
-            self.each_tuning(&mode, |tuning| tuning.add_boxes(range));
+            self.each_tuning(&mode, &mut |tuning| tuning.add_boxes(range));
         }
     }
 
     /// Every kind of tuning that a move can get, for the map's slowest mode.
-    pub(crate) fn each_slowest(&self, take: impl FnMut(&Tuning)) {
+    pub(crate) fn each_slowest(&self, take: &mut dyn FnMut(&Tuning)) {
         self.each_tuning(&self.map.slowest(), take);
     }
 
     /// The same for a mode.
-    fn each_tuning(&self, mode: &Mode, mut take: impl FnMut(&Tuning)) {
+    #[inline(never)]
+    fn each_tuning(&self, mode: &Mode, take: &mut dyn FnMut(&Tuning)) {
         match &self.source {
             Source::Named(config) => take(&named(config, mode)),
             Source::Shortest(shortest, config) => shortest
@@ -376,8 +379,18 @@ impl Follower {
     }
 
     /// The prefilters of a move, with the one in force before it.
+    ///
+    /// Cost on a Cortex-M4F: nothing for a move within a path that is shorter than the prefilter
+    /// in force, or an arc; else some 100 000 instructions.
     #[must_use]
     pub fn tunings(&self, step: &MoveToFollow, now: &Tuning) -> MoveTunings {
+        let may_change = step.is_line && step.duration_s > step.in_force_s;
+        if !step.from_rest && !may_change {
+            return MoveTunings {
+                start: *now,
+                end: *now,
+            };
+        }
         let (first, last) = self.ends(step);
         let start = if step.from_rest { first } else { *now };
         if step.is_line && step.duration_s >= change_over_s(&start, &last, step.after_arc) {
@@ -496,31 +509,55 @@ fn profile(
 }
 
 /// Prefilters for what the mode is, on average in time, while a move accelerates from rest and
-/// while it decelerates to rest: that at the mean way, [`Prefilter::mean_ways_s`]. The mode turns
-/// by as much as if it were that of there all the time.
+/// while it decelerates to rest.
+///
+/// From rest through a prefilter of length `T` and variance `σ²` the mean distance from the
+/// rest end is
+///
+/// ```text
+/// (1/T) ∫ F I(t) dt = F ((T − m)² + σ²) / (2T) ≈ F (T/8 + σ²/(2T))
+/// ```
+/// and the mode turns by as much as if it were that of there all the time.
 fn both_ends(config: &PrefilterConfig, step: &MoveToFollow) -> (Tuning, Tuning) {
     let course = &step.course;
     let feed_mm_s = course.length_mm / step.duration_s;
-    let met = |phase: usize, mode_after: &dyn Fn(f64) -> Mode| {
+    let met = |mode_after: &dyn Fn(f64) -> Mode| {
         let mut tuning = named(config, &mode_after(0.0));
         for _ in 0..2 {
-            let way_s = mean_ways_s(&tuning)[phase];
+            let way_s = mean_way_s(&tuning);
             tuning = named(config, &mode_after(feed_mm_s * way_s));
         }
         tuning
     };
     (
-        met(0, &|way_mm| course.mode_at(way_mm)),
-        met(1, &|way_mm| course.mode_at(course.length_mm - way_mm)),
+        met(&|way_mm| course.mode_at(way_mm)),
+        met(&|way_mm| course.mode_at(course.length_mm - way_mm)),
     )
 }
 
-/// [`Prefilter::mean_ways_s`] of a tuning; 0 of one that cannot be made.
+/// `T/8 + σ²/(2T)`, with the variance of symmetric stages; 0 of a prefilter that cannot be made.
 #[inline(never)]
-fn mean_ways_s(tuning: &Tuning) -> [f64; 2] {
+fn mean_way_s(tuning: &Tuning) -> f64 {
     let mut prefilter = Prefilter::NONE;
-    let made = tuning.make(&mut prefilter);
-    made.map_or([0.0; 2], |()| prefilter.mean_ways_s())
+    if tuning.make(&mut prefilter).is_err() {
+        return 0.0;
+    }
+    let length_s = prefilter.length_s();
+    let variance = |stage: &Stage| {
+        let stage_s = stage.length_s();
+        let share = match stage {
+            Stage::Box(_) => 12.0,
+            Stage::Zv(_) => 4.0,
+            Stage::Impulses(_) => 8.0,
+        };
+        stage_s * stage_s / share
+    };
+    let variance: f64 = prefilter.stages().iter().map(variance).sum();
+    if length_s > 0.0 {
+        length_s / 8.0 + variance / (2.0 * length_s)
+    } else {
+        0.0
+    }
 }
 
 /// The same prefilter for another mode.
@@ -619,6 +656,7 @@ mod tests {
             from_rest,
             is_line: true,
             after_arc: false,
+            in_force_s: 0.5,
         }
     }
 
@@ -672,6 +710,39 @@ mod tests {
                 assert_eq!(Prefilter::new(&config).unwrap().boxes_s(), [0.03, 0.012]);
             }
         }
+    }
+
+    #[test]
+    fn a_move_within_a_path_changes_the_prefilter_on_a_line_that_is_long_enough() {
+        let follower = follower(PrefilterConfig::DEFAULT, None);
+        let now = follower.slowest();
+        let end = |step: &MoveToFollow| {
+            let MoveTunings { start, end } = follower.tunings(step, &now);
+            assert_eq!(start, now);
+            end
+        };
+        // two periods at 8 Hz before and at about 9 Hz behind, and the slack
+        let in_force_s = 2.0 / 8.0;
+        let lasts = |duration_s| MoveToFollow {
+            duration_s,
+            in_force_s,
+            course: Course {
+                end: Mode {
+                    frequency_hz: 9.0,
+                    damping: 0.02,
+                },
+                ..course()
+            },
+            ..step(false)
+        };
+        assert_eq!(end(&lasts(0.2)), now);
+        assert_eq!(end(&lasts(0.28)), now);
+        assert_ne!(end(&lasts(0.32)), now);
+        let arc = MoveToFollow {
+            is_line: false,
+            ..lasts(0.32)
+        };
+        assert_eq!(end(&arc), now);
     }
 
     #[test]

@@ -234,26 +234,6 @@ impl Prefilter {
         Response::new(&self.stages, true)
     }
 
-    /// The mean way of a segment that accelerates through this prefilter from rest, over the
-    /// prefilter's length, and of one that decelerates to rest the mean way from its end: each in
-    /// s of travel.
-    ///
-    /// ```text
-    /// (1/T) ∫ I(t) dt = ((T − m)² + σ²) / (2T),   watched from the end (m² + σ²) / (2T)
-    /// ```
-    #[must_use]
-    pub fn mean_ways_s(&self) -> [f64; 2] {
-        let (length_s, mean_s) = (self.length_s(), self.centroid_s());
-        let variance_s2: f64 = self.stages.iter().map(Stage::variance_s2).sum();
-        [length_s - mean_s, mean_s].map(|side_s| {
-            if length_s > 0.0 {
-                (side_s * side_s + variance_s2) / (2.0 * length_s)
-            } else {
-                0.0
-            }
-        })
-    }
-
     /// How far the output can be from a point of the input's window, in s of travel: `m` or
     /// `T_h − m`, whichever is longer.
     #[must_use]
@@ -300,6 +280,13 @@ impl Prefilter {
     pub fn spread_s(&self) -> f64 {
         libm::sqrt(self.stages.iter().map(Stage::variance_s2).sum())
     }
+}
+
+/// Adds a length to those of boxes, the longest first, if there is room.
+pub(crate) fn add_box_s(boxes_s: &mut Vec<f64, MAX_STAGES>, length_s: f64) {
+    let longer = boxes_s.iter().take_while(|other| **other >= length_s);
+    let place = longer.count();
+    let _ = boxes_s.insert(place, length_s);
 }
 
 /// The kind for each mode that the settings name.

@@ -39,6 +39,7 @@ mod response;
 mod shapers;
 
 pub use axis_set::AxisSet;
+pub(crate) use cascade::add_box_s;
 pub use cascade::{MAX_STAGES, Prefilter, Stage};
 pub use config::{CustomImpulse, EI_RESIDUAL, PrefilterConfig, PrefilterError, SecondMode};
 pub use convolver::{Convolver, ConvolverPair, FINE_BITS};
