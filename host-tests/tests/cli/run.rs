@@ -278,6 +278,39 @@ fn comparisons_draw_speed_acceleration_and_jerk() {
 }
 
 #[test]
+fn a_comparison_draws_the_limits_that_are_set() {
+    let here = TempDir::new().unwrap();
+    let robot = here.path().join("robot.toml");
+    fs::write(
+        &robot,
+        "limits.joint1.velocity_deg_s = 60\n\
+         limits.path = { velocity_mm_s = 120, acceleration_mm_s2 = 1000 }",
+    )
+    .unwrap();
+    let arguments = [
+        "compare",
+        &programs().join("rectangle.gcode").display().to_string(),
+        "--robot",
+        robot.to_str().unwrap(),
+        "--out",
+        here.path().to_str().unwrap(),
+        "--json",
+    ];
+    let compared = json(&arguments);
+    let rows = compared["prefilters"].as_array().unwrap().len();
+    let picture = fs::read_to_string(here.path().join("prefilters.svg")).unwrap();
+    let used = picture
+        .matches("used of a limit of joints or axes\n")
+        .count();
+    assert_eq!(used, rows);
+    // at the limits of velocity and acceleration, and at 100 % of the joint's; none of a jerk
+    let lines = picture
+        .split("<text")
+        .map(|part| part.matches("#009E73").count());
+    assert_eq!(lines.filter(|count| *count > 10).count(), 3 * rows);
+}
+
+#[test]
 fn run_says_what_limits_do_and_draws_them() {
     let here = TempDir::new().unwrap();
     let robot = here.path().join("robot.toml");
