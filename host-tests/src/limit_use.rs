@@ -104,6 +104,27 @@ pub fn trace_rates(robot: &Robot, trace: &Trace) -> Vec<Rates> {
     rates(&rows, &arm)
 }
 
+/// The largest part that each row uses of any limit of the joints and the axes; empty where there
+/// are none. The path's are not among them.
+#[must_use]
+pub fn limits_used(robot: &Robot, trace: &Trace) -> Vec<f64> {
+    let mut limits = limits(&robot.config);
+    limits.retain(|(bound, _)| bound.part != Part::Path);
+    if limits.is_empty() {
+        return Vec::new();
+    }
+    let part = |row: &Rates| {
+        let parts = limits
+            .iter()
+            .map(|(bound, allowed)| value(row, *bound) / allowed);
+        parts.fold(0.0, f64::max)
+    };
+    let rows = trace_rates(robot, trace);
+    // nothing moves in the first row
+    let used = std::iter::once(0.0).chain(rows.iter().map(part));
+    used.take(trace.stop() + 1).collect()
+}
+
 /// What a run makes of every limit that is set.
 #[must_use]
 pub fn limit_uses(robot: &Robot, trace: &Trace, limited: &[Limited]) -> Vec<LimitUse> {

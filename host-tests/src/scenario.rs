@@ -5,7 +5,7 @@ use planner_core::config::Robot;
 use planner_core::corner::CornerRule;
 use planner_core::prefilter::Kind;
 
-use crate::checker::hops::{Hop, HopDefaults, hops, vertical_deviations_mm};
+use crate::checker::hops::{Hop, HopDefaults};
 use crate::checker::{
     self, CheckOptions, JointPeaks, Program, Report, TraceRow, joint_peaks, settling_time_s,
 };
@@ -112,13 +112,15 @@ impl Scenario {
             let report = checker::check(&program, &rows, &options);
             (program, report)
         });
+        let hops = checked.iter().flat_map(|(_, report)| &report.hops);
+        let vertical_deviation_mm = hops.map(|hop| hop.bent_mm).reduce(f64::max);
         Outcome {
             prefilter: self.settings.robot.prefilter.kind,
             checked,
             cycle_time_s: Trace::time_s(stop) - Trace::time_s(start.min(stop)),
             settling_time_s: settling_time_s(&times, &tool, end, Trace::time_s(stop), SETTLED_MM),
             vibration: Vibration::measure(&trace.accelerations(), trace.driven),
-            vertical_deviation_mm: self.vertical_deviation_mm(&rows),
+            vertical_deviation_mm,
             payload: PayloadFigures::new(&trace, self.settings.plant.payload.as_ref()),
             joint_peaks: joint_peaks(&trace.joints(), Trace::time_s(1)),
             limits: limit_uses(robot, &trace, &[]),
@@ -131,17 +133,16 @@ impl Scenario {
     /// The hops of the program, as the checker reads them.
     #[must_use]
     pub fn hops(&self) -> Vec<Hop> {
-        let own = self.settings.robot.hop;
-        let defaults = HopDefaults {
-            height_mm: own.height_mm.into(),
-            tolerance_mm: own.tolerance_mm.into(),
-        };
-        hops(&self.program.text, defaults).unwrap_or_default()
+        let program = Program::parse(&self.program.text).unwrap_or_default();
+        program.hops(self.hop_defaults())
     }
 
-    fn vertical_deviation_mm(&self, rows: &[TraceRow]) -> Option<f64> {
-        let found = vertical_deviations_mm(&self.hops(), rows);
-        found.into_iter().reduce(f64::max)
+    fn hop_defaults(&self) -> HopDefaults {
+        let own = self.settings.robot.hop;
+        HopDefaults {
+            height_mm: own.height_mm.into(),
+            tolerance_mm: own.tolerance_mm.into(),
+        }
     }
 
     fn check_options(&self, robot: &Robot) -> CheckOptions {
@@ -154,6 +155,7 @@ impl Scenario {
                 CornerRule::OverlapPercent(_) => f64::INFINITY,
             },
             feed_window_mm: f64::from(fastest_mm_s) * robot.prefilter().length_s(),
+            hops: self.hop_defaults(),
         }
     }
 }

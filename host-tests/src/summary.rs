@@ -6,7 +6,8 @@ use anyhow::Result;
 use planner_core::pose::JointUnit;
 use serde::Serialize;
 
-use crate::checker::Report;
+use crate::checker::program::Block;
+use crate::checker::{Program, Report};
 use crate::limit_use::LimitUse;
 use crate::mode_use::ModeUse;
 use crate::plant::{PayloadConfig, PayloadSample};
@@ -190,7 +191,10 @@ impl Figures {
     /// The figures of a run.
     #[must_use]
     pub fn new(outcome: &Outcome) -> Self {
-        let report = outcome.checked.as_ref().ok().map(|(_, report)| report);
+        // a program of hops alone has no path that could be left
+        let has_path = |program: &Program| !program.blocks.iter().all(Block::is_hop);
+        let checked = outcome.checked.as_ref().ok();
+        let report = checked.and_then(|(program, report)| has_path(program).then_some(report));
         let vibration = outcome.vibration;
         let [joint1, joint2, joint3, joint4] = outcome.joint_peaks.acceleration;
         let [_, _, third, _] = outcome.trace.joint_units();

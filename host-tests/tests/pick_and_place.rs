@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use host_tests::checker::TraceRow;
-use host_tests::checker::hops::{HopDefaults, hops, vertical_deviations_mm};
+use host_tests::checker::{CheckOptions, Program, TraceRow, check};
 use host_tests::judged_run::rows;
 use host_tests::machine::Machine;
 use host_tests::payload_search::{HopRun, Limit, fastest, run};
@@ -232,14 +231,10 @@ fn vertical_parts_are_vertical_whatever_is_filtered() {
             _ => Meanwhile::Nothing,
         };
         let rows = command(&robot, &program, meanwhile);
-        let defaults = HopDefaults {
-            height_mm: 0.0,
-            tolerance_mm: 0.0,
-        };
-        let programmed = hops(&program, defaults).unwrap();
-        let bent = vertical_deviations_mm(&programmed, &rows);
-        assert_eq!(bent.len(), 2, "{round}: {program}");
-        for bent_mm in bent {
+        let programmed = Program::parse(&program).unwrap();
+        let hops = check(&programmed, &rows, &CheckOptions::default()).hops;
+        assert_eq!(hops.len(), 2, "{round}: {program}");
+        for bent_mm in hops.iter().map(|hop| hop.bent_mm) {
             assert!(
                 bent_mm <= tolerance,
                 "{round} {meanwhile:?}: {bent_mm} of {tolerance}\n{program}"

@@ -9,9 +9,11 @@ pub mod limits;
 pub mod matching;
 pub mod program;
 pub mod report;
+pub mod sections;
 pub mod tolerance;
 
 pub use joints::{JointPeaks, joint_peaks, settling_time_s};
 pub use program::{Program, ProgramError};
-pub use report::{CheckOptions, CornerCheck, Report, TraceRow, check};
+pub use report::{CheckOptions, CornerCheck, Report, TraceRow};
+pub use sections::check;
 pub use tolerance::{ToleranceUse, tolerance_use};

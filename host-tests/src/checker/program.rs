@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::hops::{Hop, HopDefaults, HopWords};
 use crate::vector::{distance, xyz};
 
 /// Largest difference of an arc's two radii in millimetres.
@@ -16,6 +17,8 @@ enum Curve {
     Line,
     /// Centre, and the angle swept in radians, positive counter-clockwise.
     Arc([f64; 2], f64),
+    /// A pick-and-place move.
+    Hop(HopWords),
 }
 
 /// One block that moves.
@@ -40,12 +43,35 @@ impl Block {
     #[must_use]
     pub fn arc(&self) -> Option<([f64; 2], f64)> {
         match self.curve {
-            Curve::Line => None,
+            Curve::Line | Curve::Hop(_) => None,
             Curve::Arc(centre, sweep_rad) => Some((centre, sweep_rad)),
         }
     }
 
-    /// Points along the block, its start left out; chords within 1 nm of the arc.
+    /// Whether it is a pick-and-place move.
+    #[must_use]
+    pub fn is_hop(&self) -> bool {
+        matches!(self.curve, Curve::Hop(_))
+    }
+
+    /// The pick-and-place move, if it is one.
+    #[must_use]
+    pub fn as_hop(&self, defaults: HopDefaults) -> Option<Hop> {
+        let Curve::Hop(words) = self.curve else {
+            return None;
+        };
+        Some(Hop {
+            line: self.line,
+            from: xyz(self.from),
+            to: xyz(self.to),
+            height_mm: words.height_mm.unwrap_or(defaults.height_mm),
+            tolerance_mm: words.tolerance_mm.unwrap_or(defaults.tolerance_mm),
+            sets_acceleration: words.sets_acceleration,
+        })
+    }
+
+    /// Points along the block, its start left out; chords within 1 nm of the arc. Of a hop, whose
+    /// way is not programmed, its end.
     #[must_use]
     pub fn points(&self) -> Vec<[f64; 3]> {
         let Curve::Arc(centre, sweep) = self.curve else {
@@ -118,8 +144,8 @@ struct Reader {
 }
 
 impl Program {
-    /// Reads G0–G4, G17, G21, G61, G64 P or Q, G90, G91, G94, M2 and M30 with X Y Z C, I J
-    /// and F; anything else is refused rather than misjudged.
+    /// Reads G0–G4, G17, G21, G61, G64 P or Q, G90, G91, G94, M2, M30, M103 and outputs, with
+    /// X Y Z C, I J, F and the words of a hop; anything else is refused rather than misjudged.
     ///
     /// The mode at a block is that of the corner at the block's **end**.
     ///
@@ -151,7 +177,9 @@ impl Program {
                         line: i + 1,
                         from,
                         to,
-                        feed_mm_s: reader.feed_mm_s.filter(|_| reader.motion != Motion::Rapid),
+                        feed_mm_s: reader.feed_mm_s.filter(|_| {
+                            reader.motion != Motion::Rapid && !matches!(curve, Curve::Hop(_))
+                        }),
                         tolerance_mm: reader.tolerance_mm,
                         curve,
                     });
@@ -159,6 +187,13 @@ impl Program {
             }
         }
         Ok(program)
+    }
+
+    /// The pick-and-place moves in order.
+    #[must_use]
+    pub fn hops(&self, defaults: HopDefaults) -> Vec<Hop> {
+        let blocks = self.blocks.iter();
+        blocks.filter_map(|block| block.as_hop(defaults)).collect()
     }
 
     /// Pose at the end.
@@ -177,6 +212,7 @@ enum Outcome {
 impl Reader {
     fn block(&mut self, words: &[(char, f64)]) -> Result<Outcome, &'static str> {
         let word = |letter| words.iter().find(|w| w.0 == letter).map(|w| w.1);
+        let is_hop = words.contains(&('M', 103.0));
         let mut dwell = false;
         let mut end = false;
         for &(letter, value) in words {
@@ -197,6 +233,9 @@ impl Reader {
                 ('G', 91.0) => self.relative = true,
                 ('G', 17.0 | 21.0 | 94.0) => {}
                 ('M', 2.0 | 30.0) => end = true,
+                // outputs are switched where the path stands
+                ('M', 3.0 | 4.0 | 5.0 | 7.0 | 8.0 | 9.0 | 103.0) => {}
+                ('R' | 'K', _) if is_hop => {}
                 ('F', feed) if feed > 0.0 => self.feed_mm_s = Some(feed / 60.0),
                 ('X' | 'Y' | 'Z' | 'C' | 'I' | 'J' | 'P' | 'Q' | 'N', _) => {}
                 _ => return Err("a word that this reader does not know"),
@@ -219,6 +258,12 @@ impl Reader {
             }
         }
         let curve = match self.motion {
+            _ if is_hop && self.at.is_none() => return Err("a hop without a start"),
+            _ if is_hop => Curve::Hop(HopWords {
+                height_mm: word('Q'),
+                tolerance_mm: word('P'),
+                sets_acceleration: word('K').is_some(),
+            }),
             Motion::Rapid | Motion::Line => Curve::Line,
             _ if self.at.is_none() => return Err("an arc without a start"),
             turn => {
@@ -229,7 +274,7 @@ impl Reader {
                 Curve::Arc(centre, sweep(from, to, centre, turn)?)
             }
         };
-        if self.motion != Motion::Rapid && self.feed_mm_s.is_none() {
+        if !is_hop && self.motion != Motion::Rapid && self.feed_mm_s.is_none() {
             return Err("no feedrate");
         }
         self.at = Some(to);
@@ -370,6 +415,25 @@ mod tests {
     }
 
     #[test]
+    fn hops_are_read_with_their_words() {
+        let program =
+            "G21 G90\nG0 X10 Y0 Z5 ; start\nM103 X110 Z0 Q30 P0.2 R40 K5000\nM3\nM103 Y7\nM2";
+        let defaults = HopDefaults {
+            height_mm: 20.0,
+            tolerance_mm: 0.5,
+        };
+        let found = Program::parse(program).unwrap().hops(defaults);
+        assert_eq!(found.len(), 2);
+        assert_eq!(
+            (found[0].from, found[0].to, found[0].line),
+            ([10.0, 0.0, 5.0], [110.0, 0.0, 0.0], 3)
+        );
+        assert_eq!((found[0].height_mm, found[0].tolerance_mm), (30.0, 0.2));
+        assert_eq!((found[1].to, found[1].height_mm), ([110.0, 7.0, 0.0], 20.0));
+        assert!(found[0].sets_acceleration && !found[1].sets_acceleration);
+    }
+
+    #[test]
     fn refuses_what_it_does_not_know() {
         for (text, line, reason) in [
             ("G0 X0\nG1 X1", 2, "no feedrate"),
@@ -381,6 +445,7 @@ mod tests {
                 2,
                 "a word that this reader does not know",
             ),
+            ("M103 X5", 1, "a hop without a start"),
             ("X1..2", 1, "a letter without a number"),
             ("G0 XNAN", 1, "a letter without a number"),
             ("12", 1, "a number without a letter"),

@@ -1,5 +1,6 @@
 //! What a trace did, measured against its program.
 
+use super::hops::{HopCheck, HopDefaults};
 use super::matching::{Match, Place, distance_to_chord, match_in_order};
 use super::program::Program;
 use crate::vector::{add, distance, norm, scale, sub, xyz};
@@ -28,6 +29,8 @@ pub struct CheckOptions {
     /// How far along the path the feedrate of a faster block may still be seen,
     /// millimetres: at least feedrate times prefilter length.
     pub feed_window_mm: f64,
+    /// What hops do where the program does not say.
+    pub hops: HopDefaults,
 }
 
 impl Default for CheckOptions {
@@ -36,6 +39,10 @@ impl Default for CheckOptions {
             rapid_mm_s: 160.0,
             tolerance_mm: 0.5,
             feed_window_mm: 60.0,
+            hops: HopDefaults {
+                height_mm: 50.0,
+                tolerance_mm: 0.5,
+            },
         }
     }
 }
@@ -71,6 +78,8 @@ pub struct Report {
     pub max_missed_mm: f64,
     /// Corners in order.
     pub corners: Vec<CornerCheck>,
+    /// Hops in order.
+    pub hops: Vec<HopCheck>,
     /// Largest speed of the command.
     pub peak_speed_mm_s: f64,
     /// Largest excess over the feedrates nearby; negative when all is slower.
@@ -90,7 +99,7 @@ impl Report {
 
     /// What broke a promise by more than the allowances, in words; empty if nothing did.
     ///
-    /// Corners are judged by their own tolerance, path deviation and coverage by the
+    /// Corners and hops are judged by their own tolerance, path deviation and coverage by the
     /// widest. A trace knows nothing between its rows: where the velocity jumps (ZV,
     /// ZVD, EI, none) its polyline cuts a corner by up to half a row's travel more
     /// than the continuous command does.
@@ -109,6 +118,15 @@ impl Report {
                 format!(
                     "corner of line {} missed by {:.4} mm, tolerance {:.4} mm",
                     corner.line, corner.error_mm, corner.tolerance_mm
+                ),
+            );
+        }
+        for HopCheck { hop, bent_mm } in &self.hops {
+            demand(
+                *bent_mm <= hop.tolerance_mm + allowance_mm,
+                format!(
+                    "hop of line {} bent by {bent_mm:.4} mm, tolerance {:.4} mm",
+                    hop.line, hop.tolerance_mm
                 ),
             );
         }
@@ -180,9 +198,8 @@ impl Outline {
     }
 }
 
-/// Measures a trace against its program. Distances of an empty trace are infinite.
-#[must_use]
-pub fn check(program: &Program, trace: &[TraceRow], options: &CheckOptions) -> Report {
+/// Measures a trace against a program without hops. Distances of an empty trace are infinite.
+pub(super) fn check(program: &Program, trace: &[TraceRow], options: &CheckOptions) -> Report {
     let outline = Outline::new(program);
     let points: Vec<_> = trace.iter().map(|row| xyz(row.pose)).collect();
     let Match {
@@ -202,6 +219,7 @@ pub fn check(program: &Program, trace: &[TraceRow], options: &CheckOptions) -> R
         max_path_deviation_mm: distance_mm,
         max_missed_mm: missed,
         corners: corners(program, &outline, trace, (&progress, distance_mm), options),
+        hops: Vec::new(),
         peak_speed_mm_s: peak,
         feed_excess_mm_s: excess,
         drift_mm: distance(xyz(last), xyz(end)),
@@ -210,7 +228,7 @@ pub fn check(program: &Program, trace: &[TraceRow], options: &CheckOptions) -> R
 }
 
 /// From the row before the first change to the row of the last.
-fn cycle_time_s(trace: &[TraceRow]) -> f64 {
+pub(super) fn cycle_time_s(trace: &[TraceRow]) -> f64 {
     let changes = |pair: &[TraceRow]| pair[0].pose != pair[1].pose;
     match (
         trace.windows(2).position(changes),
@@ -323,6 +341,10 @@ mod tests {
         rapid_mm_s: 160.0,
         tolerance_mm: 0.5,
         feed_window_mm: 60.0,
+        hops: HopDefaults {
+            height_mm: 50.0,
+            tolerance_mm: 0.5,
+        },
     };
 
     fn program() -> Program {

@@ -8,13 +8,14 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{Attribute, Cell, CellAlignment, LineStyle, Table};
-use planner_core::config::{ConfigError, Robot};
+use planner_core::config::{ConfigError, Robot, RobotConfig};
 use planner_core::hop::HopAxes;
 use planner_core::prefilter::{Kind, Mode, PrefilterError};
 use serde::Serialize;
 
 use super::ScenarioArgs;
 use super::output::write_picture;
+use crate::limit_use::limits_used;
 use crate::payload_search::{self, Fastest};
 use crate::pictures::{ShownMotion, draw_comparison};
 use crate::progress::Progress;
@@ -69,6 +70,9 @@ struct Measured {
     /// Where the tool is commanded to be, until it has come to rest.
     #[serde(skip)]
     positions: Vec<[f64; 3]>,
+    /// The largest part used of any limit of joints and axes; empty without any.
+    #[serde(skip)]
+    limits_used: Vec<f64>,
     #[serde(flatten)]
     figures: Figures,
     #[serde(flatten)]
@@ -91,7 +95,7 @@ pub fn execute(args: &CompareArgs) -> Result<String> {
         .out
         .as_deref()
         .map(|directory| {
-            let picture = comparison.draw(scenario.settings.robot.prefilter.kind)?;
+            let picture = comparison.draw(&scenario.settings.robot)?;
             write_picture(directory, "prefilters.svg", &picture)
         })
         .transpose()?;
@@ -169,13 +173,25 @@ impl Comparison {
     ///
     /// # Errors
     /// Never in practice: the drawing goes to memory.
-    pub fn draw(&self, own: Kind) -> Result<String> {
+    pub fn draw(&self, robot: &RobotConfig) -> Result<String> {
         let feed_mm_s = self.feed_mm_s.unwrap_or(1.0);
+        let own = robot.prefilter.kind;
+        let path = robot.limits.path;
+        let [velocity, acceleration, jerk] = [path.velocity, path.acceleration, path.jerk]
+            .map(|limit| (limit > 0.0).then_some(f64::from(limit)));
+        let fastest = [self.feed_mm_s, velocity].into_iter().flatten();
         let mode = Mode {
             frequency_hz: self.frequency_hz.into(),
             damping: self.damping.into(),
         };
         let period_s = mode.damped_period_s();
+        let top = |limit: Option<f64>, unlimited: f64| limit.map_or(3.0 * unlimited, |l| 1.25 * l);
+        let limits = [fastest.reduce(f64::min), acceleration, jerk];
+        let tops = [
+            1.25 * feed_mm_s,
+            top(acceleration, feed_mm_s / period_s),
+            top(jerk, feed_mm_s / period_s / period_s),
+        ];
         let mut rows: Vec<_> = self.prefilters.iter().collect();
         rows.sort_by_key(|row| row.prefilter != own.name());
         let motions: Vec<_> = rows
@@ -184,12 +200,9 @@ impl Comparison {
             .map(|(name, measured)| ShownMotion {
                 name,
                 positions: &measured.positions,
-                limits: [self.feed_mm_s, None, None],
-                scales: [
-                    feed_mm_s,
-                    feed_mm_s / period_s,
-                    feed_mm_s / period_s / period_s,
-                ],
+                limits,
+                tops,
+                limits_used: (!measured.limits_used.is_empty()).then_some(&measured.limits_used),
             })
             .collect();
         let title = format!("{}: prefilters", self.program);
@@ -371,15 +384,21 @@ impl Row {
 fn row(scenario: &Scenario, kind: Kind, unfiltered: &Outcome) -> Result<Row> {
     let mut config = scenario.settings.robot;
     config.prefilter.kind = kind;
-    if let Err(error @ ConfigError::Prefilter(PrefilterError::TooLong { .. })) = Robot::new(&config)
-    {
-        return Ok(Row {
-            prefilter: kind.name(),
-            refused: Some(error.to_string()),
-            added_boxes_s: Vec::new(),
-            measured: None,
-        });
-    }
+    let robot = match Robot::new(&config) {
+        Err(
+            error @ ConfigError::Prefilter(
+                PrefilterError::TooLong { .. } | PrefilterError::TooManyKinks,
+            ),
+        ) => {
+            return Ok(Row {
+                prefilter: kind.name(),
+                refused: Some(error.to_string()),
+                added_boxes_s: Vec::new(),
+                measured: None,
+            });
+        }
+        made => made?,
+    };
     let outcome = match kind {
         Kind::None => unfiltered.clone(),
         _ => scenario.run_with(kind, Progress::Hidden)?,
@@ -389,6 +408,7 @@ fn row(scenario: &Scenario, kind: Kind, unfiltered: &Outcome) -> Result<Row> {
         refused: None,
         added_boxes_s: outcome.added_boxes_s.clone(),
         measured: Some(Measured {
+            limits_used: limits_used(&robot, &outcome.trace),
             positions: outcome
                 .trace
                 .poses()

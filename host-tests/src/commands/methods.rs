@@ -74,11 +74,12 @@ fn draw(scenario: &Scenario, entries: &[Entry]) -> Result<String> {
                     .map(|limits| limits.jerk_mm_s3)
                     .filter(|jerk| jerk.is_finite()),
             ],
-            scales: [
-                feed_mm_s,
-                acceleration,
-                acceleration / task.mode.damped_period_s(),
+            tops: [
+                1.25 * feed_mm_s,
+                3.0 * acceleration,
+                3.0 * acceleration / task.mode.damped_period_s(),
             ],
+            limits_used: None,
         })
         .collect();
     let title = format!("{}: methods of motion", scenario.program.name);

@@ -1,6 +1,6 @@
 //! The task that every method gets.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 
 use super::Point;
 use crate::checker::Program;
@@ -31,10 +31,18 @@ impl Task {
     /// The program of a scenario, with its robot.
     ///
     /// # Errors
-    /// The checker cannot read the program.
+    /// The checker cannot read the program, or it has hops.
     pub fn new(scenario: &Scenario) -> Result<Self> {
         let name = || scenario.program.name.clone();
         let program = Program::parse(&scenario.program.text).with_context(name)?;
+        if let Some(hop) = program.blocks.iter().find(|block| block.is_hop()) {
+            bail!(
+                "{}: line {} hops, on a way that no other method knows: go up, across and down by \
+                 G1 moves",
+                name(),
+                hop.line
+            );
+        }
         let robot = &scenario.settings.robot;
         let rapid_mm_s = f64::from(robot.rapid_mm_s);
         let curve = |block: &crate::checker::program::Block| match block.arc() {

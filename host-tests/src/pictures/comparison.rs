@@ -1,16 +1,18 @@
-//! Motions side by side: speed, acceleration and jerk of each in a row.
+//! Motions side by side: speed, acceleration and jerk of each in a row, and what is used of
+//! limits that are not the path's.
 
 use anyhow::Result;
 
 use super::canvas::{
-    Area, BACKGROUND, COMMAND, CONTRAST, Point, UNITS, axes, caption, dashed, full, headed, limit,
-    lines, picture,
+    Area, BACKGROUND, COMMAND, CONTRAST, LIMIT, Point, UNITS, axes, caption, dashed, full, headed,
+    limit, lines, picture,
 };
 use super::polyline::envelope;
 use crate::vector::{add, norm, scale, sub};
 use planner_core::units::TICK_S;
 
-const WIDTH: u32 = 1280;
+/// Width of a column.
+const COLUMN: u32 = 427;
 /// Height of a row, and of the headline above them.
 const ROW: u32 = 190;
 const HEAD: u32 = 120;
@@ -18,9 +20,6 @@ const HEAD: u32 = 120;
 /// Half the span in samples over which a derivative is taken: the first and second over 2 ms, the
 /// third, where the setpoints' resolution shows, over 20 ms.
 const SPANS: [usize; 3] = [1, 1, 10];
-
-/// Values beyond so many times the limit are cut off: an impulse is as high as a sample is short.
-const CUT: f64 = 3.0;
 
 /// Motions that take longer than so many times the first one are shown in part.
 const SHOWN: f64 = 1.6;
@@ -34,12 +33,24 @@ pub struct ShownMotion<'a> {
     pub positions: &'a [[f64; 3]],
     /// Limits that the motion keeps of itself: mm/s, mm/s², mm/s³.
     pub limits: [Option<f64>; 3],
-    /// How high the axes go, in times of these: mm/s, mm/s², mm/s³.
-    pub scales: [f64; 3],
+    /// Values beyond these are cut off, since an impulse is as high as a sample is short: mm/s,
+    /// mm/s², mm/s³.
+    pub tops: [f64; 3],
+    /// The largest part used of any limit of the joints and axes, a sample a millisecond; none
+    /// where there are no such limits.
+    pub limits_used: Option<&'a [f64]>,
 }
 
-const NAMES: [&str; 3] = ["mm/s", "mm/s²", "mm/s³"];
-const TITLES: [&str; 3] = ["speed", "acceleration", "jerk"];
+const NAMES: [&str; 4] = ["mm/s", "mm/s²", "mm/s³", "%"];
+const TITLES: [&str; 4] = [
+    "speed",
+    "acceleration",
+    "jerk",
+    "used of a limit of joints or axes",
+];
+
+/// How high the axis of what is used goes, in %.
+const MOST_USED: f64 = 125.0;
 
 /// Draws the motions, the first of which is repeated in grey behind the others.
 ///
@@ -52,23 +63,22 @@ pub fn draw(title: &str, subtitle: &str, motions: &[ShownMotion<'_>]) -> Result<
         full(BACKGROUND, 3, legend_name),
         full(CONTRAST, 3, "higher than the axis"),
     ];
-    if motions
-        .iter()
-        .flat_map(|motion| motion.limits)
-        .any(|limit| limit.is_some())
-    {
+    let has_use = motions.iter().any(|motion| motion.limits_used.is_some());
+    let mut limits = motions.iter().flat_map(|motion| motion.limits);
+    if has_use || limits.any(|limit| limit.is_some()) {
         legend.push(limit("feedrate, or limit"));
     }
+    let columns = if has_use { 4 } else { 3 };
     let rows = motions.len().max(1);
     let longest_s = motions.iter().map(rest_s).fold(0.0, f64::max);
     let first_s = motions.first().map_or(longest_s, rest_s);
     let end_s = 1.05 * longest_s.min(SHOWN * first_s);
     let reference = motions.first().map(curves).unwrap_or_default();
-    picture((WIDTH, HEAD + ROW * rows as u32), |root| {
+    picture((COLUMN * columns, HEAD + ROW * rows as u32), |root| {
         let body = headed(root, title, subtitle, &legend)?;
         for (row, motion) in body.split_evenly((rows, 1)).iter().zip(motions) {
             let own = curves(motion);
-            for (which, panel) in row.split_evenly((1, 3)).iter().enumerate() {
+            for (which, panel) in row.split_evenly((1, columns as usize)).iter().enumerate() {
                 let text = match which {
                     0 if rest_s(motion) > end_s => {
                         format!("{}, until {:.1} s: speed", motion.name, rest_s(motion))
@@ -97,12 +107,10 @@ fn draw_panel(
     end_s: f64,
     [reference, own]: [&Vec<Point>; 2],
 ) -> Result<()> {
-    let top = CUT * motion.scales[which];
-    let top = if which == 0 {
-        1.25 * motion.scales[0]
-    } else {
-        top
-    };
+    let [speed, acceleration, jerk] = motion.tops;
+    let top = [speed, acceleration, jerk, MOST_USED][which];
+    let [speed, acceleration, jerk] = motion.limits;
+    let limit = [speed, acceleration, jerk, Some(100.0)][which];
     let ranges = [(0.0, end_s), (0.0, top)];
     let names = ["time, s", NAMES[which]];
     let mut chart = axes(panel, ranges, names, [5, 3])?;
@@ -116,12 +124,8 @@ fn draw_panel(
         BACKGROUND,
         3,
     )?;
-    if let Some(limit) = motion.limits[which] {
-        dashed(
-            &mut chart,
-            [vec![(0.0, limit), (end_s, limit)]],
-            super::canvas::LIMIT,
-        )?;
+    if let Some(limit) = limit {
+        dashed(&mut chart, [vec![(0.0, limit), (end_s, limit)]], LIMIT)?;
     }
     lines(&mut chart, [envelope(within(own), 900)], COMMAND, 2)?;
     // what is cut off shows as a bar at the top
@@ -143,8 +147,15 @@ fn rest_s(motion: &ShownMotion<'_>) -> f64 {
     (motion.positions.len() - last.unwrap_or(0)) as f64 * TICK_S
 }
 
-/// Sizes of the first three derivatives over time.
-fn curves(motion: &ShownMotion<'_>) -> [Vec<Point>; 3] {
+/// Sizes of the first three derivatives over time, and the part used of a limit in %.
+fn curves(motion: &ShownMotion<'_>) -> [Vec<Point>; 4] {
+    let [speed, acceleration, jerk] = derivatives(motion);
+    let used = motion.limits_used.unwrap_or_default().iter().enumerate();
+    let used = used.map(|(k, part)| (k as f64 * TICK_S, 100.0 * part));
+    [speed, acceleration, jerk, used.collect()]
+}
+
+fn derivatives(motion: &ShownMotion<'_>) -> [Vec<Point>; 3] {
     let positions = motion.positions;
     std::array::from_fn(|order| {
         let span = SPANS[order];
@@ -188,9 +199,10 @@ mod tests {
             name: "",
             positions: &positions,
             limits: [None; 3],
-            scales: [1.0; 3],
+            tops: [1.0; 3],
+            limits_used: None,
         };
-        let [speed, acceleration, jerk] = curves(&motion);
+        let [speed, acceleration, jerk, _] = curves(&motion);
         for k in 30..170 {
             let t = f64::from(k) * TICK_S;
             let near = |found: f64, expected: f64| {

@@ -10,7 +10,8 @@ use super::canvas::{
     full, headed, limit, lines, note, picture, plot_size,
 };
 use super::polyline::{bounds, clip, equal_scale, thin, thin_to};
-use crate::checker::CornerCheck;
+use crate::checker::hops::HopCheck;
+use crate::checker::{CornerCheck, Program, Report};
 use crate::paired_run::PairedRun;
 use crate::vector::xyz;
 
@@ -36,7 +37,8 @@ struct Plane([usize; 2]);
 /// The lines that map and corners share.
 struct Lines {
     plane: Plane,
-    programmed: Vec<Point>,
+    /// In parts: between the vertical ends of a hop no way is programmed.
+    programmed: Vec<Vec<Point>>,
     commanded: Vec<Point>,
     tool: Vec<Point>,
 }
@@ -140,6 +142,26 @@ impl Plane {
     }
 }
 
+/// The programmed path in parts: from hop to hop, with the vertical part at either end of one.
+fn programmed(program: &Program, report: &Report) -> Vec<Vec<[f64; 3]>> {
+    let mut parts = vec![vec![xyz(program.start)]];
+    let mut hops = report.hops.iter();
+    for block in &program.blocks {
+        let hop = block.is_hop().then(|| hops.next()).flatten();
+        if let Some(HopCheck { hop, .. }) = hop {
+            let over = |[x, y, z]: [f64; 3]| [x, y, z + hop.height_mm];
+            if let Some(part) = parts.last_mut() {
+                part.push(over(hop.from));
+            }
+            parts.push(vec![over(hop.to)]);
+        }
+        if let Some(part) = parts.last_mut() {
+            part.extend(block.points());
+        }
+    }
+    parts
+}
+
 impl Lines {
     fn new(run: &PairedRun) -> Self {
         let trace = &run.outcome.trace;
@@ -148,13 +170,11 @@ impl Lines {
             .outcome
             .checked
             .as_ref()
-            .map_or(Vec::new(), |(program, _)| {
-                let start = plane.point(xyz(program.start));
-                let blocks = program.blocks.iter().flat_map(|block| block.points());
-                let points: Vec<_> = std::iter::once(start)
-                    .chain(blocks.map(|point| plane.point(point)))
-                    .collect();
-                points
+            .map_or(Vec::new(), |(program, report)| {
+                let parts = programmed(program, report).into_iter();
+                parts
+                    .map(|part| part.into_iter().map(|point| plane.point(point)).collect())
+                    .collect()
             });
         Self {
             programmed,
@@ -187,11 +207,9 @@ fn map(area: &Area<'_>, path: &Lines, corners: &[CornerCheck]) -> Result<()> {
         path.plane.labels(", mm").each_ref().map(String::as_str),
         [8, 8],
     )?;
-    for (points, colour, width) in [
-        (&path.programmed, BACKGROUND, 6),
-        (&path.tool, CONTRAST, 1),
-        (&path.commanded, COMMAND, 2),
-    ] {
+    let programmed = path.programmed.iter().map(|part| (part, BACKGROUND, 6));
+    let moved = [(&path.tool, CONTRAST, 1), (&path.commanded, COMMAND, 2)];
+    for (points, colour, width) in programmed.chain(moved) {
         let points = thin_to(points, unit, POINTS);
         lines(&mut chart, clip(&points, window), colour, width)?;
     }
@@ -277,11 +295,13 @@ fn enlarged(area: &Area<'_>, path: &Lines, corner: &CornerCheck, number: usize) 
     let row = (corner.time_s / TICK_S).round() as usize;
     let seen = (window[0].1).hypot(window[1].1);
     let pass = |points| passage(points, row, (x, y), seen);
-    for (points, colour, width) in [
-        (path.programmed.as_slice(), BACKGROUND, 6),
+    let programmed = path.programmed.iter();
+    let programmed = programmed.map(|part| (part.as_slice(), BACKGROUND, 6));
+    let passed = [
         (pass(&path.tool), CONTRAST, 2),
         (pass(&path.commanded), COMMAND, 2),
-    ] {
+    ];
+    for (points, colour, width) in programmed.chain(passed) {
         let points: Vec<_> = points
             .iter()
             .map(|point| (point.0 - x, point.1 - y))

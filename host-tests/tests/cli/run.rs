@@ -278,6 +278,62 @@ fn comparisons_draw_speed_acceleration_and_jerk() {
 }
 
 #[test]
+fn a_comparison_draws_the_limits_that_are_set() {
+    let here = TempDir::new().unwrap();
+    let robot = here.path().join("robot.toml");
+    fs::write(
+        &robot,
+        "limits.joint1.velocity_deg_s = 60\n\
+         limits.path = { velocity_mm_s = 120, acceleration_mm_s2 = 1000 }",
+    )
+    .unwrap();
+    let arguments = [
+        "compare",
+        &programs().join("rectangle.gcode").display().to_string(),
+        "--robot",
+        robot.to_str().unwrap(),
+        "--out",
+        here.path().to_str().unwrap(),
+        "--json",
+    ];
+    let compared = json(&arguments);
+    let rows = compared["prefilters"].as_array().unwrap().len();
+    let picture = fs::read_to_string(here.path().join("prefilters.svg")).unwrap();
+    let used = picture
+        .matches("used of a limit of joints or axes\n")
+        .count();
+    assert_eq!(used, rows);
+    // at the limits of velocity and acceleration, and at 100 % of the joint's; none of a jerk
+    let lines = picture
+        .split("<text")
+        .map(|part| part.matches("#009E73").count());
+    assert_eq!(lines.filter(|count| *count > 10).count(), 3 * rows);
+}
+
+#[test]
+fn programs_with_hops_are_checked() {
+    let here = TempDir::new().unwrap();
+    let program = here.path().join("hops.gcode");
+    fs::write(
+        &program,
+        "G0 X-200 Y0 Z-760\nG1 Y60 F9000\nX-350\nM3\nM103 X350 Y0\nM5\nG1 X300 Y40\nX350\nM103 Y0 P0.1\n",
+    )
+    .unwrap();
+    let robot = programs().join("../robots/delta-800-payload.toml");
+    let robot = robot.to_str().unwrap();
+    let run = |program: &str| json(&["run", program, "--robot", robot, "--json"]);
+    let summary = run(program.to_str().unwrap());
+    assert!((4.9..=5.0).contains(&number(&summary, "max_corner_error_mm")));
+    assert!((3.0..=4.0).contains(&number(&summary, "max_path_deviation_mm")));
+    assert!((0.3..=0.5).contains(&number(&summary, "vertical_deviation_max_mm")));
+    // a hop alone has no path that could be left
+    let alone = programs().join("hop.gcode");
+    let summary = run(alone.to_str().unwrap());
+    assert!((0.3..=0.5).contains(&number(&summary, "vertical_deviation_max_mm")));
+    assert_eq!(summary["max_path_deviation_mm"], Value::Null);
+}
+
+#[test]
 fn run_says_what_limits_do_and_draws_them() {
     let here = TempDir::new().unwrap();
     let robot = here.path().join("robot.toml");
