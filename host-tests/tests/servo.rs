@@ -286,7 +286,13 @@ fn gains_come_from_the_settings() {
         }
         desk.records.clone()
     });
-    let gains = with_controller(records, |desk| *desk.servos());
+    let gains = with_controller(records, |desk| {
+        let gains = *desk.servos();
+        desk.run_ms(5);
+        assert!(desk.ask("$RST=$").ends_with("ok\r\n"));
+        assert_eq!(desk.servos(), &ServoGains::SCARA);
+        gains
+    });
     assert_eq!(gains[1..], ServoGains::SCARA[1..]);
     let slow = tracking_error_of(gains);
     let published = tracking_error_urad(0.0, 0.0);

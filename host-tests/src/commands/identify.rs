@@ -193,8 +193,9 @@ fn on_controller(args: &IdentifyArgs, address: &Address) -> Result<String, Failu
     let line = format!("{}={}", args.by.command(), args.excite);
     let answer = session.ask_patiently(&line, PATIENCE).map_err(link)?;
     let info = accepted(address, &line, answer)?;
-    let found = found(&info).map(|found| found.map(|value| value as f32));
-    let Some([frequency_hz, damping, confidence]) = found else {
+    let mut modes = found(&info).into_iter();
+    let first = modes.next().map(|mode| mode.map(|value| value as f32));
+    let Some([frequency_hz, damping, confidence]) = first else {
         return Err(anyhow!("{address}: the controller did not say what it found").into());
     };
     if args.store {
@@ -217,9 +218,12 @@ fn on_controller(args: &IdentifyArgs, address: &Address) -> Result<String, Failu
     } else {
         "Store it with --store, or the line $ID=store."
     };
-    Ok(format!(
-        "{frequency_hz} Hz, damping {damping}, confidence {confidence}\n{stored}"
-    ))
+    let mut text = format!("{frequency_hz} Hz, damping {damping}, confidence {confidence}\n");
+    for [frequency_hz, damping, confidence] in modes {
+        text +=
+            &format!("Beside it: {frequency_hz} Hz, damping {damping}, confidence {confidence}\n");
+    }
+    Ok(text + stored)
 }
 
 /// What was said with a line that was accepted, or the sentence of its refusal.

@@ -244,7 +244,8 @@ impl Survey<'_> {
             }
             Some(_) => return Err(refused(line, &answer)),
         }
-        let Some([frequency_hz, damping, confidence]) = found(&answer.info) else {
+        let modes = found(&answer.info);
+        let Some(&[frequency_hz, damping, confidence]) = modes.first() else {
             return Err(SurveyError::Unforeseen(line));
         };
         if confidence < TRUSTED {
@@ -389,10 +390,14 @@ fn is_hopeless(answer: &Answer) -> bool {
     NO_RECORD.iter().any(|no_record| reason == *no_record)
 }
 
-/// `[ID:frequency,damping,confidence]` among what was said with an answer.
+/// The modes among what was said with an answer, `[ID:frequency,damping,confidence]` each; the one
+/// that is looked for first.
 #[must_use]
-pub fn found(info: &[String]) -> Option<[f64; 3]> {
-    let said = info.iter().find_map(|line| line.strip_prefix("ID:"))?;
-    let values: Result<Vec<f64>, _> = said.split(',').map(str::parse).collect();
-    values.ok()?.try_into().ok()
+pub fn found(info: &[String]) -> Vec<[f64; 3]> {
+    let lines = info.iter().filter_map(|line| line.strip_prefix("ID:"));
+    let modes = lines.filter_map(|said| {
+        let values: Result<Vec<f64>, _> = said.split(',').map(str::parse).collect();
+        values.ok()?.try_into().ok()
+    });
+    modes.collect()
 }
