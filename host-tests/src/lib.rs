@@ -36,6 +36,7 @@ pub mod serial_loop;
 pub mod setpoint_watch;
 pub mod software_loop;
 pub mod summary;
+pub mod survey;
 pub mod switched_arm;
 mod toml_place;
 pub mod tool_path;

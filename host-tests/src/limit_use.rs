@@ -113,10 +113,11 @@ pub fn limits_used(robot: &Robot, trace: &Trace) -> Vec<f64> {
     if limits.is_empty() {
         return Vec::new();
     }
+    let kind = robot.arm.kind();
     let part = |row: &Rates| {
         let parts = limits
             .iter()
-            .map(|(bound, allowed)| value(row, *bound) / allowed);
+            .map(|(bound, allowed)| value(kind, row, *bound) / allowed);
         parts.fold(0.0, f64::max)
     };
     let rows = trace_rates(robot, trace);

@@ -3,6 +3,9 @@
 use anyhow::{Context, Result, ensure};
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::motion::Setpoint;
+use planner_core::pose::AXES;
+use planner_core::protocol::SETTINGS;
+use planner_core::servo::{GAINS, ServoConfig};
 
 use crate::emulator::{Board, Emulator, build_image, check_qemu};
 use crate::progress::Progress;
@@ -94,6 +97,20 @@ fn record_on_emulator(robot: &Robot, program: &str, progress: Progress) -> Resul
         setpoints: run.setpoints.iter().map(|frame| frame.setpoint).collect(),
         tick_instructions_max: Some(run.worst_tick_instructions),
     })
+}
+
+/// The lines that give a controller the gains of its drives' servos, without their `$`.
+#[must_use]
+pub fn servo_settings(servos: &[ServoConfig; AXES]) -> Vec<String> {
+    let servo_rows = SETTINGS.iter().filter(|row| row.name.starts_with("servo"));
+    let rows: Vec<_> = servo_rows.collect();
+    let lines = rows.chunks(GAINS.len()).zip(servos).map(|(rows, servo)| {
+        let mut gains = servo.gains;
+        let pairs = rows.iter().zip(gains.values());
+        let pairs = pairs.map(|(row, value)| format!("{}={value}", row.name));
+        pairs.collect::<Vec<_>>().join(" ")
+    });
+    lines.collect()
 }
 
 /// The lines that give a controller these settings, without their `$`; one line holds those

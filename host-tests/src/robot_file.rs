@@ -15,7 +15,7 @@ use planner_core::posture::{FollowError, MapError, MapNode, ModeMapConfig, Postu
 use planner_core::prefilter::{
     AxisSet, CustomImpulse, Kind, MAX_IMPULSES, PrefilterConfig, PrefilterError,
 };
-use planner_core::servo::ServoConfig;
+use planner_core::servo::ServoGains;
 use serde::{Deserialize, Deserializer};
 
 use crate::plant::{DeltaArm, FullConfig, Mode, PayloadConfig};
@@ -698,7 +698,7 @@ impl Tables {
         let servo = &self.servo;
         let tables = [&servo.joint1, &servo.joint2, &servo.joint3, &servo.joint4];
         for (servo, table) in plant.servos.iter_mut().zip(tables) {
-            table.apply(servo);
+            table.apply(&mut servo.gains);
         }
         RobotSettings { plant, robot }
     }
@@ -794,17 +794,17 @@ impl From<RobotName> for ArmKind {
 }
 
 impl ServoTable {
-    fn apply(&self, servo: &mut ServoConfig) {
-        set(&mut servo.position_gain, self.position_gain_per_s);
-        set(&mut servo.velocity_gain, self.velocity_gain);
-        set(&mut servo.integral_time_s, self.integral_time_s);
-        set(&mut servo.velocity_feed_forward, self.velocity_feed_forward);
+    fn apply(&self, gains: &mut ServoGains) {
+        set(&mut gains.position_gain, self.position_gain_per_s);
+        set(&mut gains.velocity_gain, self.velocity_gain);
+        set(&mut gains.integral_time_s, self.integral_time_s);
+        set(&mut gains.velocity_feed_forward, self.velocity_feed_forward);
         set(
-            &mut servo.acceleration_feed_forward,
+            &mut gains.acceleration_feed_forward,
             self.acceleration_feed_forward,
         );
-        set(&mut servo.torque_limit, self.torque_limit);
-        set(&mut servo.observer_rad_s, self.observer_rad_s);
+        set(&mut gains.torque_limit, self.torque_limit);
+        set(&mut gains.observer_rad_s, self.observer_rad_s);
     }
 }
 

@@ -2,6 +2,7 @@
 //! of the controller's second port, the accelerometer or the drives.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 
 use planner_core::accelerometer::SampleFrame;
 use planner_core::following_error::FollowingErrorFrame;
@@ -163,7 +164,13 @@ impl SensedPlant {
     /// The largest acceleration in so many ticks after the last stop, in mm/s².
     #[must_use]
     pub fn largest_after_stop_mm_s2(&self, ticks: usize) -> f64 {
-        let felt = self.felt_mm_s2.iter().take(ticks);
+        self.largest_within_mm_s2(0..ticks)
+    }
+
+    /// The largest acceleration within some ticks, counted from the last stop, in mm/s².
+    #[must_use]
+    pub fn largest_within_mm_s2(&self, ticks: Range<usize>) -> f64 {
+        let felt = self.felt_mm_s2.iter().take(ticks.end).skip(ticks.start);
         felt.map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max)
     }
 }

@@ -10,11 +10,12 @@ use planner_core::config::Robot;
 use planner_core::identify::Listener;
 use planner_core::motion::{DelayLines, Motion, Order, Setpoint};
 use planner_core::planner::Planner;
-use planner_core::pose::{JointPosition, Pose};
+use planner_core::pose::{AXES, JointPosition, Pose};
 use planner_core::protocol::{
     Controller, Health, Identity, Inputs, RECORD_BYTES, Record, Report, Settings, Step,
 };
 use planner_core::queue::{LOOKAHEAD, SegmentQueue};
+use planner_core::servo::ServoGains;
 use planner_core::telemetry::SetpointFrame;
 
 /// Bytes that a port hands over at once.
@@ -172,6 +173,11 @@ impl SerialLoop<'_> {
     /// The robot that planning uses.
     pub fn robot(&self) -> &Robot {
         self.controller.robot()
+    }
+
+    /// The gains of the drives' servos.
+    pub fn servos(&self) -> &[ServoGains; AXES] {
+        self.controller.servos()
     }
 
     /// What encoders read with the tool at a point.

@@ -3,7 +3,10 @@
 
 use host_tests::oracle::servo as oracle;
 use host_tests::plant::{FullConfig, FullPlant, JointSetpoint};
-use planner_core::servo::{CYCLES_PER_TICK, Cubic, Knot, SIXTEENTHS, Servo, ServoConfig, Travel};
+use host_tests::serial_loop::{Records, with_controller};
+use planner_core::servo::{
+    CYCLES_PER_TICK, Cubic, Knot, SIXTEENTHS, Servo, ServoConfig, ServoGains, Travel,
+};
 use proptest::prelude::*;
 
 const TICK_S: f64 = 1e-3;
@@ -112,26 +115,30 @@ fn on_the_reference_move_the_acceleration_is_right_within_30_degrees_per_second_
 /// Gains of a joint of the simulated robot.
 fn config() -> ServoConfig {
     ServoConfig {
-        position_gain: 200.0,
-        velocity_gain: 100.0,
+        gains: ServoGains {
+            position_gain: 200.0,
+            velocity_gain: 100.0,
+            torque_limit: 50.0,
+            ..ServoGains::PUBLISHED
+        },
         motor_inertia: 0.1,
         total_inertia: 0.12,
-        torque_limit: 50.0,
         ..ServoConfig::default()
     }
 }
 
 fn in_double(config: &ServoConfig) -> oracle::ServoConfig {
+    let gains = config.gains;
     oracle::ServoConfig {
         motor_inertia: config.motor_inertia.into(),
         feed_forward_inertia: config.total_inertia.into(),
-        position_gain: config.position_gain.into(),
-        velocity_gain: config.velocity_gain.into(),
-        integral_time_s: config.integral_time_s.into(),
-        velocity_feed_forward: config.velocity_feed_forward.into(),
-        acceleration_feed_forward: config.acceleration_feed_forward.into(),
-        torque_limit: config.torque_limit.into(),
-        observer_rad_s: config.observer_rad_s.into(),
+        position_gain: gains.position_gain.into(),
+        velocity_gain: gains.velocity_gain.into(),
+        integral_time_s: gains.integral_time_s.into(),
+        velocity_feed_forward: gains.velocity_feed_forward.into(),
+        acceleration_feed_forward: gains.acceleration_feed_forward.into(),
+        torque_limit: gains.torque_limit.into(),
+        observer_rad_s: gains.observer_rad_s.into(),
     }
 }
 
@@ -142,7 +149,8 @@ proptest! {
         start in -3.0_f64..3.0, swing in 0.001_f64..0.3, rad_s in 1.0_f64..60.0,
         limit in 5.0_f32..500.0, load in 0.5_f64..2.0
     ) {
-        let config = ServoConfig { torque_limit: limit, ..config() };
+        let mut config = config();
+        config.gains.torque_limit = limit;
         let path = |t: f64| Motion {
             position: start + swing * (1.0 - (rad_s * t).cos()),
             velocity: swing * rad_s * (rad_s * t).sin(),
@@ -178,37 +186,18 @@ proptest! {
 
 #[test]
 fn a_servo_is_refused_by_the_name_of_its_setting() {
-    let wrong = [
-        (
-            "position_gain",
-            ServoConfig {
-                position_gain: 0.0,
-                ..config()
-            },
-        ),
-        (
-            "integral_time_s",
-            ServoConfig {
-                integral_time_s: f32::NAN,
-                ..config()
-            },
-        ),
-        (
-            "torque_limit",
-            ServoConfig {
-                torque_limit: -1.0,
-                ..config()
-            },
-        ),
-        (
-            "observer_rad_s",
-            ServoConfig {
-                observer_rad_s: 1e6,
-                ..config()
-            },
-        ),
+    let wrong: [(&str, fn(&mut ServoConfig)); 5] = [
+        ("position_gain", |config| config.gains.position_gain = 0.0),
+        ("integral_time_s", |config| {
+            config.gains.integral_time_s = f32::NAN;
+        }),
+        ("torque_limit", |config| config.gains.torque_limit = -1.0),
+        ("observer_rad_s", |config| config.gains.observer_rad_s = 1e6),
+        ("total_inertia", |config| config.total_inertia = 0.0),
     ];
-    for (name, config) in wrong {
+    for (name, change) in wrong {
+        let mut config = config();
+        change(&mut config);
         let error = Servo::new(&config, 0).unwrap_err();
         assert_eq!(error.name, name);
         assert!(error.to_string().contains(name), "{error}");
@@ -218,10 +207,17 @@ fn a_servo_is_refused_by_the_name_of_its_setting() {
 /// The largest tracking error of joint 1's motor in the full plant in µrad, on a move of 60°
 /// with limited jerk.
 fn tracking_error_urad(velocity_share: f32, acceleration_share: f32) -> f64 {
+    tracking_error_of(ServoGains::SCARA.map(|gains| ServoGains {
+        velocity_feed_forward: velocity_share,
+        acceleration_feed_forward: acceleration_share,
+        ..gains
+    }))
+}
+
+fn tracking_error_of(gains: [ServoGains; 4]) -> f64 {
     let mut plant = FullConfig::default();
-    for joint in &mut plant.joints {
-        joint.servo.velocity_feed_forward = velocity_share;
-        joint.servo.acceleration_feed_forward = acceleration_share;
+    for (joint, gains) in plant.joints.iter_mut().zip(gains) {
+        joint.servo.gains = gains;
     }
     let start = plant.start;
     let mut plant = FullPlant::new(plant);
@@ -261,4 +257,47 @@ fn feed_forward_takes_the_tracking_error_out_of_a_move() {
     assert!((15_000.0..25_000.0).contains(&none), "{none}");
     assert!(velocity < none / 10.0, "{velocity}");
     assert!((5.0..velocity / 2.0).contains(&both), "{both}");
+}
+
+#[test]
+fn the_simulated_drives_have_the_default_settings() {
+    let joints = FullConfig::default().joints;
+    assert_eq!(joints.map(|joint| joint.servo.gains), ServoGains::SCARA);
+}
+
+/// As a drive's controller gets its gains: by `$` lines, kept over a restart.
+#[test]
+fn gains_come_from_the_settings() {
+    let records = with_controller(Records::new(), |desk| {
+        desk.run_ms(5);
+        assert_eq!(desk.servos(), &ServoGains::SCARA);
+        for line in [
+            "$servo1-velocity-feed-forward=0 servo1-acceleration-feed-forward=0",
+            "$1310=100",
+        ] {
+            assert!(desk.ask(line).ends_with("ok\r\n"), "{line}");
+        }
+        for line in [
+            "$servo1-position-gain=0",
+            "$servo5-observer=1",
+            "$servo1-=1",
+        ] {
+            assert!(desk.ask(line).contains("error:"), "{line}");
+        }
+        desk.records.clone()
+    });
+    let gains = with_controller(records, |desk| {
+        let gains = *desk.servos();
+        desk.run_ms(5);
+        assert!(desk.ask("$RST=$").ends_with("ok\r\n"));
+        assert_eq!(desk.servos(), &ServoGains::SCARA);
+        gains
+    });
+    assert_eq!(gains[1..], ServoGains::SCARA[1..]);
+    let slow = tracking_error_of(gains);
+    let published = tracking_error_urad(0.0, 0.0);
+    // without feed-forward a joint lags by its velocity over the position gain
+    let ratio = slow / published;
+    println!("{slow:.0} µrad with half the position gain, {ratio:.3} times as much");
+    assert!((1.9..2.05).contains(&ratio), "{ratio}");
 }

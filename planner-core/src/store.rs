@@ -37,6 +37,7 @@ const fn key(record: Record) -> u8 {
         Record::Offsets => 2,
         Record::BuildName => 3,
         Record::Map => 4,
+        Record::Servos => 5,
         Record::StartupLine(line) => 8 + (line & 1),
     }
 }

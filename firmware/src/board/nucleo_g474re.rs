@@ -4,7 +4,7 @@
 //! |---|---|
 //! | commands | LPUART1, PA2 / PA3: the ST-LINK's virtual serial port, 115200 Bd |
 //! | setpoints | USART1 TX on PC4 (Arduino D1), 2 MBd |
-//! | accelerometer | USART1 RX on PC5 (Arduino D0), 2 MBd: a sample frame for each setpoint frame |
+//! | accelerometer or drives | USART1 RX on PC5 (Arduino D0), 2 MBd: a frame for each setpoint frame that asks for one |
 //! | outputs | gripper PA5 (Arduino D13, LED LD2), blow-off PA6 (D12); high is on |
 //! | inputs | limits of joints 1 to 4 on PA0, PA1, PA4, PB0 (A0 to A3), door PC1 (A4); pulled up, a switch to ground is active |
 //! | clock | HSE 24 MHz, PLL ÷ 6 × 85 ÷ 2 |

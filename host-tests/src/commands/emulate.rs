@@ -17,7 +17,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::bridge::{Bridge, Ends, Ports, listen};
 use crate::emulator::{Board, EmulatedBoard, Pace, PlantPort, build_image, check_qemu};
-use crate::machine::settings;
+use crate::machine::{servo_settings, settings};
 use crate::robot_file::RobotSettings;
 use crate::sensed_plant::SensedPlant;
 
@@ -48,8 +48,8 @@ pub struct EmulateArgs {
     /// Robot file (TOML) whose settings the controller gets; its own if there is none.
     #[arg(long, value_name = "FILE")]
     robot: Option<PathBuf>,
-    /// Let the simulated robot of the robot file follow the setpoints; its accelerometer answers
-    /// them, so that the controller can identify its mode.
+    /// Let the simulated robot of the robot file follow the setpoints; its accelerometer and its
+    /// drives answer them, so that the controller can identify its mode.
     #[arg(long)]
     plant: bool,
     /// File that the controller's flash is kept in, made if there is none (16 MiB, mostly
@@ -77,7 +77,7 @@ pub struct EmulateArgs {
 pub fn execute(args: &EmulateArgs) -> Result<String> {
     let robot = RobotSettings::load(args.robot.as_deref())?;
     let lines = match &args.robot {
-        Some(_) => settings(&robot.robot),
+        Some(_) => [settings(&robot.robot), servo_settings(&robot.plant.servos)].concat(),
         None => Vec::new(),
     };
     let command_clients = open_port(args.tcp, "--tcp")?;

@@ -5,23 +5,25 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, Error, Result, anyhow};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use planner_core::identify::{
     DAMPING_WITHIN, FREQUENCY_WITHIN, Identified, IdentifiedMode, identify,
 };
 use serde::Serialize;
 
-use super::Failure;
+use super::{Failure, identify_grid};
 use crate::link::{Address, Connection, LinkError, codes};
 use crate::pictures;
 use crate::record_file::RecordFile;
 use crate::sender::{self, Session, SessionError};
+use crate::survey::{Grid, found};
 
 /// Exit status: the link could not be opened, or was lost.
-const LINK: u8 = 5;
+pub(super) const LINK: u8 = 5;
 
-/// How long a move, a record and an identification may take.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// How long a move, a record and an identification may take: seconds, but an emulated controller's
+/// are longer on a machine that is busy.
+pub(super) const PATIENCE: Duration = Duration::from_secs(300);
 
 /// Arguments of `identify`.
 #[derive(Args, Debug)]
@@ -29,6 +31,11 @@ const PATIENCE: Duration = Duration::from_secs(60);
 On a controller it moves the robot, records what the accelerometer on its second port sends in the \
 second after the stop, and identifies there. The way has to be clear. Start and stop both excite: \
 where nothing stands out, another length helps.
+
+With --grid it does so at each node of a grid: it goes there, and the test move ends at the node. A \
+record that cannot be trusted is made again with a shorter move, twice; nodes that stay open, or \
+that the robot cannot reach, are filled from their neighbours. The robot has to know where it is, \
+and the whole grid has to be clear, with the length of the move around it.
 
 Exit status: 0, 1 the record or the controller's answer is a refusal, 2 wrong use, 5 the link could \
 not be opened, was lost or silent.")]
@@ -40,6 +47,18 @@ pub struct IdentifyArgs {
     /// Controller that identifies instead: serial device, pseudo-terminal, or tcp:HOST:PORT.
     #[arg(long, value_name = "PORT", conflicts_with_all = ["file", "modes", "out"])]
     on: Option<Address>,
+    /// What is listened to.
+    #[arg(
+        long,
+        value_name = "SIGNAL",
+        default_value = "accelerometer",
+        requires = "on"
+    )]
+    pub(super) by: By,
+    /// Identify at every node of a grid and make the controller's map of it:
+    /// COLUMNS,ROWS,X0,X1,Y0,Y1 in mm, or the word map for the grid of its map.
+    #[arg(long, value_name = "GRID", requires = "on")]
+    grid: Option<Grid>,
     /// The move that excites: axis words, relative, and a feedrate.
     #[arg(
         long = "move",
@@ -47,10 +66,10 @@ pub struct IdentifyArgs {
         default_value = "X40 F9600",
         requires = "on"
     )]
-    excite: String,
-    /// Make the mode that is found the prefilter's, and keep it.
+    pub(super) excite: String,
+    /// Make the mode that is found the prefilter's, or the map the controller's, and keep it.
     #[arg(long, requires = "on")]
-    store: bool,
+    pub(super) store: bool,
     /// Speed of a serial device.
     #[arg(long, value_name = "BAUD", default_value_t = 115_200, requires = "on")]
     baud: u32,
@@ -62,7 +81,35 @@ pub struct IdentifyArgs {
     out: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
+}
+
+/// What a controller listens to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum By {
+    /// The accelerometer on the tool.
+    Accelerometer,
+    /// The following error of joint 1.
+    Joint1,
+    /// That of joint 2.
+    Joint2,
+    /// That of joint 3.
+    Joint3,
+    /// That of joint 4.
+    Joint4,
+}
+
+impl By {
+    /// The command that identifies by it.
+    pub(super) const fn command(self) -> &'static str {
+        match self {
+            Self::Accelerometer => "$ID",
+            Self::Joint1 => "$ID1",
+            Self::Joint2 => "$ID2",
+            Self::Joint3 => "$ID3",
+            Self::Joint4 => "$ID4",
+        }
+    }
 }
 
 /// A record with what was found in it.
@@ -140,15 +187,15 @@ fn on_controller(args: &IdentifyArgs, address: &Address) -> Result<String, Failu
         SessionError::Link(error) => link(error),
         error => Failure::from(Error::from(error)),
     })?;
-    let line = format!("$ID={}", args.excite);
+    if let Some(grid) = &args.grid {
+        return identify_grid::survey(args, grid, address, &mut session);
+    }
+    let line = format!("{}={}", args.by.command(), args.excite);
     let answer = session.ask_patiently(&line, PATIENCE).map_err(link)?;
     let info = accepted(address, &line, answer)?;
-    let said = info.iter().find_map(|line| line.strip_prefix("ID:"));
-    let values = said.map(|said| said.split(',').map(str::parse).collect());
-    let Some(Ok::<Vec<f32>, _>(values)) = values else {
-        return Err(anyhow!("{address}: the controller did not say what it found").into());
-    };
-    let [frequency_hz, damping, confidence] = values[..] else {
+    let mut modes = found(&info).into_iter();
+    let first = modes.next().map(|mode| mode.map(|value| value as f32));
+    let Some([frequency_hz, damping, confidence]) = first else {
         return Err(anyhow!("{address}: the controller did not say what it found").into());
     };
     if args.store {
@@ -171,9 +218,12 @@ fn on_controller(args: &IdentifyArgs, address: &Address) -> Result<String, Failu
     } else {
         "Store it with --store, or the line $ID=store."
     };
-    Ok(format!(
-        "{frequency_hz} Hz, damping {damping}, confidence {confidence}\n{stored}"
-    ))
+    let mut text = format!("{frequency_hz} Hz, damping {damping}, confidence {confidence}\n");
+    for [frequency_hz, damping, confidence] in modes {
+        text +=
+            &format!("Beside it: {frequency_hz} Hz, damping {damping}, confidence {confidence}\n");
+    }
+    Ok(text + stored)
 }
 
 /// What was said with a line that was accepted, or the sentence of its refusal.

@@ -8,6 +8,7 @@ pub mod emulate;
 mod failure;
 pub mod forward;
 pub mod identify;
+mod identify_grid;
 pub mod inverse;
 pub mod methods;
 mod model_args;

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use planner_core::servo::{ServoConfig, Travel};
+use planner_core::servo::{ServoConfig, ServoGains, Travel};
 
 use super::arm::{ArmInertia, ScaraArm};
 use super::body::Body;
@@ -144,12 +144,14 @@ fn joint(travel: Travel, motor: f64, link: f64, stiffness: f64, torque_limit: f3
     JointConfig {
         servo: ServoConfig {
             travel,
-            position_gain: 200.0,
-            velocity_gain: 2500.0 * motor as f32,
+            gains: ServoGains {
+                position_gain: 200.0,
+                velocity_gain: 2500.0 * motor as f32,
+                torque_limit,
+                ..ServoGains::PUBLISHED
+            },
             motor_inertia: motor as f32,
             total_inertia: (motor + link) as f32,
-            torque_limit,
-            ..ServoConfig::default()
         },
         stiffness,
         // A damping ratio of 0.05 against a motor that holds still.

@@ -122,7 +122,7 @@ fn mechanics_without_damping_and_drives_keep_their_energy() {
     };
     for joint in &mut config.joints {
         joint.damping = 0.0;
-        joint.servo.torque_limit = 0.0;
+        joint.servo.gains.torque_limit = 0.0;
     }
     let start = config.start;
     let mut plant = FullPlant::new(config.clone());
@@ -177,7 +177,7 @@ fn servo_settles_after_a_step() {
 fn feed_forward_keeps_up_and_its_absence_lags_by_v_over_kp() {
     for (share, lag) in [(1.0, 0.0), (0.0, 0.3 / 200.0)] {
         let mut config = FullConfig::default();
-        config.joints[3].servo.velocity_feed_forward = share;
+        config.joints[3].servo.gains.velocity_feed_forward = share;
         let mut plant = FullPlant::new(config.clone());
         let mut out = plant.output();
         let mut sent = [0.0; 2];
@@ -327,7 +327,7 @@ fn a_delta_without_damping_and_drives_keeps_its_energy() {
     };
     for joint in &mut config.joints {
         joint.damping = 0.0;
-        joint.servo.torque_limit = 0.0;
+        joint.servo.gains.torque_limit = 0.0;
     }
     let start = config.start;
     let mut plant = FullPlant::new(config);
@@ -351,7 +351,7 @@ fn a_deltas_first_mode_is_where_the_thesis_measured_it() {
     };
     for joint in &mut config.joints {
         joint.servo.motor_inertia = 1e4;
-        joint.servo.torque_limit = 0.0;
+        joint.servo.gains.torque_limit = 0.0;
     }
     let start = config.start;
     // Arms 2 and 3 a little off, to the opposite: the platform goes sideways.

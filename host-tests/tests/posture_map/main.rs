@@ -3,3 +3,4 @@
 mod promises;
 mod residual;
 mod support;
+mod survey;

@@ -421,10 +421,17 @@ const COMMANDS: &[Row] = &[
     ),
     row(
         "$ID=",
-        "identifies the mode that a move (relative, with F) excites: frequency, damping, confidence",
+        "identifies the modes that a move (relative, with F) excites: frequency, damping, confidence",
         &[AT, "@accelerometer"],
         "$ID=X40 F9600",
         &["[ID:6.3", ",0.02", "]", "ok"],
+    ),
+    row(
+        "$ID1=",
+        "likewise by the following error that joint 1's drive tells; $ID2= to $ID4= by the others'",
+        &[AT, "@accelerometer"],
+        "$ID1=X40 F9600",
+        &["[ID:3", ",0.02", "]", "ok"],
     ),
     row(
         "$ID",
@@ -435,7 +442,7 @@ const COMMANDS: &[Row] = &[
     ),
     row(
         "$ID=store",
-        "makes that the prefilter's mode, and keeps it",
+        "makes the first of them the prefilter's mode, and keeps it",
         &[AT, "@accelerometer", "$ID=X40 F9600", "$ID=store"],
         "$frequency",
         &["=6.3", "ok"],

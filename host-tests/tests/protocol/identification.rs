@@ -147,3 +147,99 @@ fn what_cannot_be_identified_is_refused_with_a_sentence() {
         );
     });
 }
+
+/// A plant whose tool is so heavy.
+fn plant_with_tool(mass_kg: f64, frequency_hz: f64) -> SensedPlant {
+    let mode = Mode {
+        frequency_hz,
+        damping: 0.02,
+    };
+    let config = FullConfig {
+        mode: ModeMap::constant(mode),
+        tool_mass_kg: mass_kg,
+        ..FullConfig::default()
+    };
+    SensedPlant::new(config, 0)
+}
+
+/// All `[ID:…]` lines of an answer.
+fn all_found(heard: &str) -> Vec<[f64; 3]> {
+    let lines = heard.lines().filter(|line| line.starts_with("[ID:"));
+    lines.map(found).collect()
+}
+
+/// A tool of half a kilogram pulls at the joints by a few µrad, beside their own mode.
+#[test]
+fn a_heavy_tools_mode_is_in_the_following_error() {
+    let frequency_hz = 6.34;
+    for line in ["$ID1=Y40 F9600", "$ID2=X40 F9600"] {
+        with_plant(plant_with_tool(0.5, frequency_hz), |desk| {
+            let (_, way) = line.split_once('=').unwrap();
+            let by_tool = found(&desk.ask(&format!("$ID={way}")))[0];
+            desk.run_ms(20_000);
+            desk.ask(&format!("$J=G91 {}", way.replace("40", "-40")));
+            desk.run_ms(20_000);
+            desk.heard();
+            let heard = desk.ask(line);
+            let modes = all_found(&heard);
+            println!("{frequency_hz} Hz, {line}: {by_tool} Hz by the tool, {heard}");
+            assert_eq!(modes.len(), 2, "{heard}");
+            assert!((modes[0][0] / by_tool - 1.0).abs() < 0.005, "{heard}");
+        });
+    }
+}
+
+/// A light tool is not felt: what the joints tell of is their own mode, of 32 Hz here, which the
+/// drives of two joints and the tool tell alike.
+#[test]
+fn a_light_tool_leaves_the_joints_own_mode() {
+    with_plant(plant_with_tool(0.05, 6.34), |desk| {
+        let mut told = Vec::new();
+        for line in ["$ID1=X40 F9600", "$ID2=X40 F9600", "$ID=X40 F9600"] {
+            let heard = desk.ask(line);
+            assert!(heard.ends_with("ok\r\n"), "{line}: {heard}");
+            told.push(all_found(&heard));
+            desk.run_ms(20_000);
+            assert!(desk.ask("$J=G91 X-40 F9600").contains("ok"));
+            desk.run_ms(20_000);
+            desk.heard();
+        }
+        println!("{told:?}");
+        let by_tool = told[2][1][0];
+        assert!((30.0..34.0).contains(&by_tool), "{told:?}");
+        for by_drive in [told[0][0][0], told[1][0][0]] {
+            assert!((by_drive / by_tool - 1.0).abs() < 0.01, "{told:?}");
+        }
+    });
+}
+
+#[test]
+fn drives_that_tell_nothing_are_named() {
+    with_plant(plant(6.34, 0.022, 0), |desk| {
+        desk.plant = None;
+        let heard = desk.ask("$ID3=X1 F600");
+        assert!(
+            heard.contains("error:92") && heard.contains("The drives tell no following error"),
+            "{heard}"
+        );
+    });
+}
+
+/// With a map in force, or with a prefilter chosen for each move, the test move excites as well.
+#[test]
+fn the_map_is_not_in_the_way_of_an_identification() {
+    for settings in [
+        &["$map=1,1,200,300,-50,50", "$map1=11.3/0.02"][..],
+        &["$frequency=11.3", "$automatic=1"],
+    ] {
+        with_plant(plant(11.3, 0.02, 0), |desk| {
+            for line in settings {
+                assert!(desk.ask(line).ends_with("ok\r\n"), "{line}");
+            }
+            let before = desk.robot().config;
+            let heard = desk.ask("$ID=X40 F9600");
+            assert!((found(&heard)[0] / 11.3 - 1.0).abs() < 0.005, "{heard}");
+            assert_eq!(desk.robot().config, before);
+        });
+    }
+}

@@ -4,12 +4,13 @@ use heapless::Deque;
 
 use crate::config::{ConfigError, Robot, SettingError};
 use crate::gcode::{Line, LineBuffer, Offsets, Received};
-use crate::identify::{self, Identified, Listen, Signal};
+use crate::identify::{self, Identified, Listen, MODES, Signal};
 use crate::joint_space::Space;
 use crate::motion::{MotionState, Order};
 use crate::planner::{LineError, Planner};
-use crate::pose::{JointPosition, Pose};
+use crate::pose::{AXES, JointPosition, Pose};
 use crate::posture::ModeMapConfig;
+use crate::servo::ServoGains;
 
 use super::alarm::Alarm;
 use super::cycle_start::CycleStart;
@@ -183,8 +184,8 @@ pub struct Controller<'c, 'q> {
     after_stop: Option<AfterStop>,
     homing: Homing,
     identification: Identification,
-    /// The last one that was found since the start.
-    mode_found: Option<ModeFound>,
+    /// The last ones that were found since the start, none or the one that is looked for first.
+    modes_found: [Option<ModeFound>; MODES],
     rates: Rates,
     cadence: Cadence,
     wishes: Wishes,
@@ -234,7 +235,7 @@ impl<'c, 'q> Controller<'c, 'q> {
             after_stop: None,
             homing: Homing::new(),
             identification: Identification::new(Signal::Acceleration([0.0; 3])),
-            mode_found: None,
+            modes_found: [None; MODES],
             rates: Rates::FULL,
             cadence: Cadence::new(),
             wishes: Wishes::NONE,
@@ -269,6 +270,12 @@ impl<'c, 'q> Controller<'c, 'q> {
     #[must_use]
     pub const fn robot(&self) -> &Robot {
         self.planner.robot()
+    }
+
+    /// The gains of the drives' servos.
+    #[must_use]
+    pub const fn servos(&self) -> &[ServoGains; AXES] {
+        &self.settings.servos
     }
 
     /// Whether moves of a program have come whose end is still to come.
@@ -725,7 +732,7 @@ impl Controller<'_, '_> {
             AfterStop::JogCancelled => self.mode = Mode::Ready,
             AfterStop::IdentificationCancelled => {
                 self.end_identification();
-                self.out(Out::Message("The identification was cancelled"));
+                self.out(Out::Message(identification::CANCELLED));
                 self.out(Out::Error(Refusal::NotIdentified.code()));
             }
             AfterStop::Stop => {
@@ -1142,10 +1149,14 @@ impl Controller<'_, '_> {
             return self.refuse(Refusal::SoftLimitsNeedPosition);
         }
         let changes_map = settings.robot.map != self.settings.robot.map;
+        let changes_servos = settings.servos != self.settings.servos;
         if self.adopt(&settings) {
             self.out(Out::Keep(Record::Settings));
             if changes_map {
                 self.out(Out::Keep(Record::Map));
+            }
+            if changes_servos {
+                self.out(Out::Keep(Record::Servos));
             }
             self.accept();
         }
@@ -1206,24 +1217,30 @@ impl Controller<'_, '_> {
                 }
             }
             Record::BuildName => self.build_name = text,
-            Record::Settings | Record::Map | Record::Offsets => {}
+            Record::Settings | Record::Map | Record::Servos | Record::Offsets => {}
         }
     }
 
     fn restore_defaults(&mut self, restore: Restore) {
-        if matches!(restore, Restore::Settings | Restore::All) && self.adopt(&Settings::default()) {
+        let all = restore == Restore::All;
+        // What is forgotten as a whole need not be kept before.
+        let has_settings = all || restore == Restore::Settings;
+        let is_adopted = has_settings && self.adopt(&Settings::default());
+        if is_adopted && !all {
             self.out(Out::Keep(Record::Settings));
             self.out(Out::Keep(Record::Map));
+            self.out(Out::Keep(Record::Servos));
         }
-        if matches!(restore, Restore::Offsets | Restore::All) {
+        if all || restore == Restore::Offsets {
             self.planner.set_offsets(Offsets::NONE);
             self.cadence.offset_changed();
-            self.out(Out::Keep(Record::Offsets));
         }
-        if restore == Restore::All {
+        if all {
             self.startup_lines = [KeptText::new(), KeptText::new()];
             self.build_name = KeptText::new();
             self.out(Out::ForgetRecords);
+        } else if restore == Restore::Offsets {
+            self.out(Out::Keep(Record::Offsets));
         }
         self.out(Out::Message("Restoring defaults"));
         self.accept();
@@ -1377,12 +1394,8 @@ impl Controller<'_, '_> {
             }
             identification::Next::Silent => {
                 self.not_identified(match self.identification.signal() {
-                    Signal::Acceleration(_) => {
-                        "The accelerometer is silent: check that it answers the setpoints"
-                    }
-                    Signal::FollowingError(_) => {
-                        "The drives tell no following error: check that they answer the setpoints"
-                    }
+                    Signal::Acceleration(_) => identification::ACCELEROMETER_SILENT,
+                    Signal::FollowingError(_) => identification::DRIVES_SILENT,
                 });
             }
         }
@@ -1403,11 +1416,7 @@ impl Controller<'_, '_> {
         self.end_identification();
         match result {
             Ok(found) => {
-                self.mode_found = found.modes.first().map(|mode| ModeFound {
-                    frequency_hz: mode.frequency_hz,
-                    damping: mode.damping,
-                    confidence: mode.confidence,
-                });
+                self.modes_found = self.identification.modes(found);
                 self.show_mode_found();
             }
             Err(refusal) => {
@@ -1431,17 +1440,17 @@ impl Controller<'_, '_> {
     }
 
     fn show_mode_found(&mut self) {
-        match self.mode_found {
-            Some(mode) => {
-                self.out(Out::ModeFound(mode));
-                self.accept();
-            }
-            None => self.refuse(Refusal::NothingToStore),
+        if self.modes_found == [None; MODES] {
+            return self.refuse(Refusal::NothingToStore);
         }
+        for mode in self.modes_found.into_iter().flatten() {
+            self.out(Out::ModeFound(mode));
+        }
+        self.accept();
     }
 
     fn store_mode_found(&mut self) {
-        let Some(mode) = self.mode_found else {
+        let [Some(mode), ..] = self.modes_found else {
             return self.refuse(Refusal::NothingToStore);
         };
         let mut settings = self.settings;
@@ -1472,6 +1481,7 @@ impl Controller<'_, '_> {
                 let settings = Settings::from_bytes(bytes);
                 self.adopt_kept(&settings);
             }
+            Record::Servos => self.settings.take_servo_bytes(bytes),
             Record::Map => {
                 if let Some(map) = ModeMapConfig::from_bytes(bytes) {
                     let mut settings = self.settings;
@@ -1505,6 +1515,7 @@ impl Controller<'_, '_> {
         match record {
             Record::Settings => copied(buffer, &self.settings.to_bytes()),
             Record::Map => copied(buffer, &self.settings.robot.map.to_bytes()),
+            Record::Servos => copied(buffer, &self.settings.servo_bytes()),
             Record::Offsets => copied(buffer, &self.planner.interpreter().offsets().to_bytes()),
             Record::StartupLine(line) => {
                 let text = self.startup_lines.get(usize::from(line));

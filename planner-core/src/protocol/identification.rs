@@ -14,15 +14,19 @@
 //! stands out calls for another length.
 //!
 //! A mode that changes with the posture is that of the place where the move ends.
+//!
+//! Where two modes are found the first one is that which is looked for: in an acceleration of the
+//! tool the one of the larger amplitude, in a joint's following error the slower one, because the
+//! joint's own mode is always the larger there, and faster than what swings at the arm's end.
 
-use crate::identify::{Listen, Listening, Signal};
+use crate::identify::{Identified, IdentifiedMode, Listen, Listening, MODES, Signal};
 use crate::prefilter::{Kind, PrefilterConfig};
 
 /// After the motion stands, until the record begins, in ms.
 const SETTLE_MS: u32 = 50;
 
 /// Longest wait for a sample, in ms: who does not answer is not there.
-const PATIENCE_MS: u32 = 3_000;
+const PATIENCE_MS: u32 = 5_000;
 
 /// The prefilter of the move.
 pub const EXCITING: PrefilterConfig = PrefilterConfig {
@@ -31,6 +35,20 @@ pub const EXCITING: PrefilterConfig = PrefilterConfig {
     damping: 0.0,
     ..PrefilterConfig::DEFAULT
 };
+
+/// The message of one that was stopped on its way.
+pub const CANCELLED: &str = "The identification was cancelled";
+
+/// The message of one by an accelerometer that is not there.
+pub const ACCELEROMETER_SILENT: &str =
+    "The accelerometer is silent: check that it answers the setpoints";
+
+/// The message of one by drives that do not tell their following errors.
+pub const DRIVES_SILENT: &str =
+    "The drives tell no following error: check that they answer the setpoints";
+
+/// The messages that tell of no record, but that there is none.
+pub const NO_RECORD: [&str; 3] = [CANCELLED, ACCELEROMETER_SILENT, DRIVES_SILENT];
 
 /// A mode as it was identified.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +59,16 @@ pub struct ModeFound {
     pub damping: f32,
     /// The probability of being right, 0 to 1.
     pub confidence: f32,
+}
+
+impl From<&IdentifiedMode> for ModeFound {
+    fn from(mode: &IdentifiedMode) -> Self {
+        Self {
+            frequency_hz: mode.frequency_hz,
+            damping: mode.damping,
+            confidence: mode.confidence,
+        }
+    }
 }
 
 /// What an identification does now.
@@ -92,6 +120,21 @@ impl Identification {
     #[must_use]
     pub const fn signal(&self) -> Signal {
         self.signal
+    }
+
+    /// The modes of a record, the one that is looked for first.
+    #[must_use]
+    pub fn modes(&self, found: &Identified) -> [Option<ModeFound>; MODES] {
+        let mut modes = [None; MODES];
+        for (place, mode) in modes.iter_mut().zip(&found.modes) {
+            *place = Some(ModeFound::from(mode));
+        }
+        if let (Signal::FollowingError(_), [Some(first), Some(second)]) = (self.signal, &modes)
+            && second.frequency_hz < first.frequency_hz
+        {
+            modes.reverse();
+        }
+        modes
     }
 
     /// What to do next. `ticks` is how many there were since the start, `stands` says whether
@@ -158,9 +201,9 @@ mod tests {
         let mut after =
             |ms, count| identification.next(from.wrapping_add(ms), true, Listening::Busy(count));
         assert_eq!(after(10, 0), Next::Wait);
-        assert_eq!(after(3_000, 0), Next::Wait);
-        assert_eq!(after(3_005, 1), Next::Wait);
-        assert_eq!(after(6_004, 1), Next::Wait);
-        assert_eq!(after(6_005, 1), Next::Silent);
+        assert_eq!(after(5_000, 0), Next::Wait);
+        assert_eq!(after(5_005, 1), Next::Wait);
+        assert_eq!(after(10_004, 1), Next::Wait);
+        assert_eq!(after(10_005, 1), Next::Silent);
     }
 }

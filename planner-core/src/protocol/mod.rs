@@ -30,6 +30,7 @@ pub use alarm::Alarm;
 pub use controller::{Controller, Identity, Step};
 pub use dollar::{Description, Dollar, Restore};
 pub use homing::HomingConfig;
+pub use identification::NO_RECORD;
 pub use overrides::Rates;
 pub use record::{KeptText, RECORD_BYTES, Record, TEXT_BYTES};
 pub use refusal::{ERRORS, Refusal};

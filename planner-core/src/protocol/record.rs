@@ -3,15 +3,17 @@
 use crate::gcode::Offsets;
 use crate::posture::MAP_BYTES;
 
-use super::settings::SETTINGS_BYTES;
+use super::settings::{SERVO_BYTES, SETTINGS_BYTES};
 
 /// A piece of what is kept; it is read and written as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Record {
-    /// All settings.
+    /// All settings but the servos'.
     Settings,
     /// The map of the mode.
     Map,
+    /// The servos' settings.
+    Servos,
     /// Work offsets and stored positions.
     Offsets,
     /// Start-up line 0 or 1.
@@ -31,13 +33,14 @@ pub const RECORD_BYTES: usize = 640;
 
 const _: () = assert!(SETTINGS_BYTES <= RECORD_BYTES && Offsets::BYTES <= RECORD_BYTES);
 
-const _: () = assert!(MAP_BYTES <= RECORD_BYTES);
+const _: () = assert!(MAP_BYTES <= RECORD_BYTES && SERVO_BYTES <= RECORD_BYTES);
 
 impl Record {
-    /// Every record there is; the map goes with settings that come before it.
-    pub const ALL: [Self; 6] = [
+    /// Every record there is; the map and the servos go with settings that come before it.
+    pub const ALL: [Self; 7] = [
         Self::Settings,
         Self::Map,
+        Self::Servos,
         Self::Offsets,
         Self::StartupLine(0),
         Self::StartupLine(1),

@@ -10,8 +10,10 @@ use super::homing::HomingConfig;
 use super::report::Inputs;
 use crate::config::{RobotConfig, SettingError, SettingValue};
 use crate::hop::HopAxes;
+use crate::pose::AXES;
 use crate::posture::PostureMethod;
 use crate::prefilter::{AxisSet, Kind as Prefilter};
+use crate::servo::{GAINS, ServoGains};
 
 /// How the controller deals with its sender and its inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,7 +60,7 @@ impl Default for ProtocolConfig {
 }
 
 /// All that `$$` lists.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// The robot and its prefilter.
     pub robot: RobotConfig,
@@ -66,6 +68,19 @@ pub struct Settings {
     pub protocol: ProtocolConfig,
     /// How the joints find their limit inputs.
     pub homing: HomingConfig,
+    /// The servos of joints 1 to 4. They are kept for the drives, in which servos run.
+    pub servos: [ServoGains; AXES],
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            robot: RobotConfig::default(),
+            protocol: ProtocolConfig::default(),
+            homing: HomingConfig::default(),
+            servos: ServoGains::SCARA,
+        }
+    }
 }
 
 /// A setting's kind of value, with what is needed to check and to describe it.
@@ -104,8 +119,8 @@ pub struct Setting {
 }
 
 /// Names of the groups of settings.
-pub const GROUPS: [&str; 7] = [
-    "Reports", "Safety", "Link", "Robot", "Motion", "Homing", "Limits",
+pub const GROUPS: [&str; 8] = [
+    "Reports", "Safety", "Link", "Robot", "Motion", "Homing", "Limits", "Servos",
 ];
 
 const REPORTS: u8 = 0;
@@ -115,6 +130,7 @@ const ROBOT: u8 = 3;
 const MOTION: u8 = 4;
 const HOMING: u8 = 5;
 const LIMITS: u8 = 6;
+const SERVOS: u8 = 7;
 
 const fn setting(
     number: u16,
@@ -181,8 +197,107 @@ const AXIS_SETS: &[&str] = &{
     names
 };
 
-/// The table, by number.
-pub const SETTINGS: [Setting; 98] = [
+/// The rows of a joint's servo.
+macro_rules! servo {
+    ($joint:literal, $number:literal) => {
+        [
+            gain(
+                $number,
+                0,
+                concat!("servo", $joint, "-position-gain"),
+                "Position gain",
+                "1/s",
+            ),
+            gain(
+                $number,
+                1,
+                concat!("servo", $joint, "-velocity-gain"),
+                "Velocity gain",
+                "Nms/rad or Ns/m",
+            ),
+            gain(
+                $number,
+                2,
+                concat!("servo", $joint, "-integral-time"),
+                "Integral time",
+                "s",
+            ),
+            gain(
+                $number,
+                3,
+                concat!("servo", $joint, "-velocity-feed-forward"),
+                "Velocity fed forward",
+                "",
+            ),
+            gain(
+                $number,
+                4,
+                concat!("servo", $joint, "-acceleration-feed-forward"),
+                "Acceleration fed forward",
+                "",
+            ),
+            gain(
+                $number,
+                5,
+                concat!("servo", $joint, "-torque-limit"),
+                "Torque limit",
+                "Nm or N",
+            ),
+            gain(
+                $number,
+                6,
+                concat!("servo", $joint, "-observer"),
+                "Velocity observer",
+                "rad/s",
+            ),
+        ]
+    };
+}
+
+const fn gain(
+    first: u16,
+    gain: usize,
+    name: &'static str,
+    label: &'static str,
+    unit: &'static str,
+) -> Setting {
+    let range = GAINS[gain];
+    setting(
+        first + gain as u16,
+        name,
+        SERVOS,
+        label,
+        unit,
+        decimal(range.low, range.high),
+    )
+}
+
+const SERVO_SETTINGS: [[Setting; GAINS.len()]; AXES] = [
+    servo!("1", 1310),
+    servo!("2", 1320),
+    servo!("3", 1330),
+    servo!("4", 1340),
+];
+
+/// The table, by number. A static, so that it is in the flash once.
+pub static SETTINGS: [Setting; OWN + GAINS.len() * AXES] = {
+    let mut all = [OWN_SETTINGS[0]; OWN + GAINS.len() * AXES];
+    let mut i = 0;
+    while i < all.len() {
+        all[i] = if i < OWN {
+            OWN_SETTINGS[i]
+        } else {
+            SERVO_SETTINGS.as_flattened()[i - OWN]
+        };
+        i += 1;
+    }
+    all
+};
+
+/// Settings of the controller's own, which are not the drives'.
+const OWN: usize = OWN_SETTINGS.len();
+
+const OWN_SETTINGS: [Setting; 98] = [
     setting(
         5,
         "inputs-inverted",
@@ -958,8 +1073,11 @@ pub const SETTINGS: [Setting; 98] = [
 /// Number and value of a setting, as kept.
 const PAIR_BYTES: usize = 6;
 
-/// All settings, as kept.
-pub const SETTINGS_BYTES: usize = SETTINGS.len() * PAIR_BYTES;
+/// All settings but those of the servos, as kept.
+pub const SETTINGS_BYTES: usize = OWN * PAIR_BYTES;
+
+/// The settings of the servos, as kept.
+pub const SERVO_BYTES: usize = GAINS.len() * AXES * 4;
 
 impl Setting {
     /// The setting of that number or name.
@@ -1081,7 +1199,8 @@ impl Settings {
         }
     }
 
-    /// As kept over a restart: number and value of each setting, little-endian.
+    /// As kept over a restart, but for the servos: number and value of each setting,
+    /// little-endian.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; SETTINGS_BYTES] {
         let mut buffer = [0; SETTINGS_BYTES];
@@ -1110,6 +1229,30 @@ impl Settings {
             }
         }
         settings
+    }
+
+    /// The servos' settings as kept over a restart, little-endian.
+    #[must_use]
+    pub fn servo_bytes(&self) -> [u8; SERVO_BYTES] {
+        let mut buffer = [0; SERVO_BYTES];
+        let mut servos = self.servos;
+        let values = servos.iter_mut().flat_map(ServoGains::values);
+        for (place, value) in buffer.as_chunks_mut::<4>().0.iter_mut().zip(values) {
+            *place = value.to_le_bytes();
+        }
+        buffer
+    }
+
+    /// Takes the servos' settings as kept; what is out of range stays as it is.
+    pub fn take_servo_bytes(&mut self, bytes: &[u8]) {
+        let values = self.servos.iter_mut().flat_map(ServoGains::values);
+        let ranges = GAINS.iter().cycle();
+        for ((place, range), bytes) in values.zip(ranges).zip(bytes.as_chunks::<4>().0) {
+            let value = f32::from_le_bytes(*bytes);
+            if (range.low..=range.high).contains(&value) {
+                *place = value;
+            }
+        }
     }
 
     /// Sets a value that [`Setting::takes`].
@@ -1146,9 +1289,19 @@ impl Settings {
             "home2" => Place::Number(home2),
             "home3" => Place::Number(home3),
             "home4" => Place::Number(home4),
-            _ => Place::Robot,
+            _ => gain_named(&mut self.servos, name).map_or(Place::Robot, Place::Number),
         }
     }
+}
+
+/// The gain of that name, as in `servo1-position-gain`.
+fn gain_named<'a>(servos: &'a mut [ServoGains; AXES], name: &str) -> Option<&'a mut f32> {
+    if !name.starts_with("servo") {
+        return None;
+    }
+    let mut all = SETTINGS.iter().skip(OWN);
+    let nth = all.position(|setting| setting.name == name)?;
+    servos.iter_mut().flat_map(ServoGains::values).nth(nth)
 }
 
 #[cfg(test)]
@@ -1203,6 +1356,18 @@ mod tests {
             .set_all("1001=1 prefilter=zv link1=123.25 10=0 elbow=left")
             .unwrap();
         assert_eq!(Settings::from_bytes(&settings.to_bytes()), settings);
+        settings
+            .set_all("servo1-position-gain=150 servo4-observer=900")
+            .unwrap();
+        assert_eq!(settings.servos[0].position_gain, 150.0);
+        assert_eq!(settings.servos[3].observer_rad_s, 900.0);
+        let mut kept = Settings::default();
+        kept.take_servo_bytes(&settings.servo_bytes());
+        assert_eq!(kept.servos, settings.servos);
+        // what is cut off, or out of range, leaves the defaults
+        let mut kept = Settings::default();
+        kept.take_servo_bytes(&[0xFF; 6]);
+        assert_eq!(kept, Settings::default());
         // an older list, and one with what does not exist
         assert_eq!(Settings::from_bytes(&[]), Settings::default());
         let unknown = [0xFF, 0xFF, 0, 0, 0, 0, 22, 0, 0, 0, 0, 0x42, 1, 2];

@@ -44,7 +44,7 @@ impl Servo {
             si_per_lsb: config.travel.si_per_lsb(),
             cubic: Cubic::new(rest, rest, config.travel),
             to: rest,
-            observer: Observer::new(config.observer_rad_s, position),
+            observer: Observer::new(config.gains.observer_rad_s, position),
             integral: 0.0,
             torque: 0.0,
             lag: 0.0,
@@ -61,6 +61,7 @@ impl Servo {
     /// encoder's reading in the setpoints' unit.
     pub fn cycle(&mut self, cycle: u32, encoder: i32) -> f32 {
         let config = &self.config;
+        let gains = &config.gains;
         let sixteenths = cycle.min(CYCLES_PER_TICK) * (SIXTEENTHS / CYCLES_PER_TICK);
         let lag = self.cubic.way_to(encoder, sixteenths).wrapping_neg();
         let lag = lag as f32 * (self.si_per_lsb / 65_536.0);
@@ -69,13 +70,13 @@ impl Servo {
         let acceleration = self.cubic.acceleration(sixteenths + 1) * self.si_per_lsb;
 
         let observed = self.observer.correct(encoder, self.si_per_lsb);
-        let target = config.position_gain * lag + config.velocity_feed_forward * wanted;
+        let target = gains.position_gain * lag + gains.velocity_feed_forward * wanted;
         let error = target - observed;
-        let ahead = config.acceleration_feed_forward * config.total_inertia * acceleration;
-        let proportional = config.velocity_gain * error;
-        let integral = self.integral + proportional * (CYCLE_S / config.integral_time_s);
+        let ahead = gains.acceleration_feed_forward * config.total_inertia * acceleration;
+        let proportional = gains.velocity_gain * error;
+        let integral = self.integral + proportional * (CYCLE_S / gains.integral_time_s);
         let torque = proportional + integral + ahead;
-        self.torque = torque.clamp(-config.torque_limit, config.torque_limit);
+        self.torque = torque.clamp(-gains.torque_limit, gains.torque_limit);
         let is_free = self.torque == torque;
         if is_free || (torque > 0.0) != (error > 0.0) {
             self.integral = integral;
@@ -94,7 +95,7 @@ impl Servo {
     /// Whether the torque stands at its limit.
     #[must_use]
     pub fn is_saturated(&self) -> bool {
-        self.torque.abs() >= self.config.torque_limit
+        self.torque.abs() >= self.config.gains.torque_limit
     }
 
     /// Which way the joint moves.

@@ -5,7 +5,7 @@
 //! around a velocity loop, and feed-forward of velocity and acceleration. It runs on the
 //! microcontroller of a drive, or against a simulated joint; nothing of the planner is needed.
 //!
-//! config ([`ServoConfig`]: SI units) → active and state ([`Servo`], one a joint). Setpoints
+//! config ([`ServoConfig`]: SI units; of it the [`ServoGains`] are settings of the controller) → active and state ([`Servo`], one a joint). Setpoints
 //! ([`Knot`]) and encoder readings are positions in machine units.
 
 mod cascade;
@@ -14,7 +14,7 @@ mod cubic;
 mod observer;
 
 pub use cascade::Servo;
-pub use config::{ServoConfig, ServoError, Travel};
+pub use config::{GAINS, GainRange, ServoConfig, ServoError, ServoGains, Travel};
 pub use cubic::{Cubic, Knot, SIXTEENTHS};
 
 /// Drive cycles in a control tick.

@@ -2,6 +2,7 @@
 //! pseudo-terminal and over TCP.
 
 mod emulate;
+mod identify;
 mod intervene;
 mod monitor;
 mod noise;
