@@ -24,6 +24,7 @@ pub mod payload_search;
 pub mod pictures;
 pub mod plant;
 pub mod plant_config;
+pub mod prefilters_chosen;
 pub mod program_file;
 pub mod progress;
 pub mod random_program;

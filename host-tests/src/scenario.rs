@@ -11,6 +11,7 @@ use crate::checker::{
 };
 use crate::limit_use::{LimitUse, limit_uses};
 use crate::machine::Machine;
+use crate::prefilters_chosen::{ChosenPrefilter, prefilters_chosen};
 use crate::program_file::ProgramFile;
 use crate::progress::Progress;
 use crate::robot_file::RobotSettings;
@@ -59,6 +60,8 @@ pub struct Outcome {
     pub limits: Vec<LimitUse>,
     /// Boxes in s that the prefilter was given because limits need them.
     pub added_boxes_s: Vec<f64>,
+    /// The prefilters that moves get by a map or automatically; empty where all have the same.
+    pub prefilters_chosen: Vec<ChosenPrefilter>,
     /// Instructions of the dearest tick; the host does not count.
     pub tick_instructions_max: Option<u32>,
 }
@@ -78,8 +81,11 @@ impl Scenario {
         let trace = Trace::simulate(setpoints, self.plant, &self.settings.plant, progress);
         let motion = setpoints.len();
         let mut outcome = self.measure(&robot, trace, motion);
-        let limited = software_loop::limited_feeds(&robot, &self.program.text)?;
-        outcome.limits = limit_uses(&robot, &outcome.trace, &limited);
+        let planned = software_loop::plan(&robot, &self.program.text)?;
+        outcome.limits = limit_uses(&robot, &outcome.trace, &planned.limited);
+        if robot.follower.is_some() {
+            outcome.prefilters_chosen = prefilters_chosen(&robot, &planned.at_ends);
+        }
         outcome.tick_instructions_max = recording.tick_instructions_max;
         Ok(outcome)
     }
@@ -125,6 +131,7 @@ impl Scenario {
             joint_peaks: joint_peaks(&trace.joints(), Trace::time_s(1)),
             limits: limit_uses(robot, &trace, &[]),
             added_boxes_s: robot.added_boxes_s().collect(),
+            prefilters_chosen: Vec::new(),
             tick_instructions_max: None,
             trace,
         }

@@ -6,7 +6,9 @@ use planner_core::config::{ConfigError, Robot, RobotConfig};
 use planner_core::limits::Limited;
 use planner_core::motion::{DelayLines, Motion, MotionState, Order, Setpoint};
 use planner_core::planner::{LineError, Planner};
-use planner_core::queue::SegmentQueue;
+use planner_core::posture::Tuning;
+use planner_core::queue::{RawItem, SegmentQueue};
+use planner_core::raw::Pace;
 
 /// Why a program does not run; nothing has moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,15 +43,24 @@ impl From<LineError> for ProgramError {
 /// # Errors
 /// [`ProgramError`] names the first line that is refused.
 pub fn check(robot: &Robot, program: &str) -> Result<(), ProgramError> {
-    limited_feeds(robot, program).map(drop)
+    plan(robot, program).map(drop)
 }
 
-/// Plans the whole program without moving, and yields the segments whose feed a limit lowers.
+/// What planning tells of a program beside its motion.
+#[derive(Clone, Debug, Default)]
+pub struct Planned {
+    /// The segments whose feed a limit lowers.
+    pub limited: Vec<Limited>,
+    /// What the prefilter at the end of each move is made of.
+    pub at_ends: Vec<Tuning>,
+}
+
+/// Plans the whole program without moving.
 ///
 /// # Errors
 /// As [`check`].
-pub fn limited_feeds(robot: &Robot, program: &str) -> Result<Vec<Limited>, ProgramError> {
-    let mut limited = Vec::new();
+pub fn plan(robot: &Robot, program: &str) -> Result<Planned, ProgramError> {
+    let mut planned_so_far = Planned::default();
     let mut queue = SegmentQueue::new();
     let (producer, mut consumer) = queue.split();
     let mut planned = robot.clone();
@@ -58,15 +69,19 @@ pub fn limited_feeds(robot: &Robot, program: &str) -> Result<Vec<Limited>, Progr
     for line in program.lines() {
         let accepted = planner.line(line.as_bytes())?;
         moves |= accepted.queued;
-        limited.extend(accepted.limited);
+        planned_so_far.limited.extend(accepted.limited);
         if accepted.ended {
             break;
         }
-        while consumer.pop().is_some() {}
+        while let Some(item) = consumer.pop() {
+            if matches!(item, RawItem::Segment(segment) if segment.pace != Pace::StandStill) {
+                planned_so_far.at_ends.push(planner.robot().tuning);
+            }
+        }
         while consumer.pop_kernel().is_some() {}
     }
     if moves {
-        Ok(limited)
+        Ok(planned_so_far)
     } else {
         Err(ProgramError::Empty)
     }

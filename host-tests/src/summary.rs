@@ -11,6 +11,7 @@ use crate::checker::{Program, Report};
 use crate::limit_use::LimitUse;
 use crate::mode_use::ModeUse;
 use crate::plant::{PayloadConfig, PayloadSample};
+use crate::prefilters_chosen::ChosenPrefilter;
 use crate::scenario::{Outcome, Scenario};
 use crate::trace::Trace;
 
@@ -27,6 +28,8 @@ pub struct Summary {
     pub damping: f32,
     /// The modes that it is made for, with the axes on which it is.
     pub modes: Vec<ModeUse>,
+    /// The prefilters that moves get by a map or automatically; empty where all have the same.
+    pub prefilters_chosen: Vec<ChosenPrefilter>,
     /// Corner tolerance where the program sets none.
     pub tolerance_mm: f32,
     /// `full` or `ideal`.
@@ -148,6 +151,7 @@ impl Summary {
             frequency_hz: robot.prefilter.frequency_hz,
             damping: robot.prefilter.damping,
             modes: ModeUse::all(&robot.prefilter),
+            prefilters_chosen: outcome.prefilters_chosen.clone(),
             tolerance_mm: robot.corner_tolerance_mm,
             plant: scenario.plant.name(),
             on: scenario.machine.name(),

@@ -71,6 +71,8 @@ pub fn execute(args: &RunArgs) -> Result<String> {
     let row = |name: &str, value: &dyn Display| format!("  {name:22} {value}");
     if let Some(follower) = &robot.follower {
         lines.push(row("prefilters", follower));
+        let chosen = run.summary.prefilters_chosen.iter();
+        lines.extend(chosen.map(|one| row("", one)));
     }
     if robot.config.prefilter.chooses_axes() || run.summary.modes.len() > 1 {
         let modes = ["first mode", "second mode"]

@@ -369,6 +369,30 @@ fn run_says_what_limits_do_and_draws_them() {
 }
 
 #[test]
+fn run_says_which_prefilters_are_chosen_and_why() {
+    let here = TempDir::new().unwrap();
+    let robot = here.path().join("robot.toml");
+    fs::write(
+        &robot,
+        "prefilter = { automatic = true, uncertainty = 0.1, residual_limit = 0.05 }",
+    )
+    .unwrap();
+    let arguments = ["run", &corner_path(), "--robot", robot.to_str().unwrap()];
+    let output = stillpoint(&arguments).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let summary = json(&[arguments.as_slice(), &["--json"]].concat());
+    let chosen = summary["prefilters_chosen"].as_array().unwrap();
+    assert_eq!(chosen.len(), 1, "{chosen:?}");
+    assert_eq!(chosen[0]["moves"], 5);
+    let name = chosen[0]["prefilter"].as_str().unwrap();
+    let line = format!("5 moves: {name} for 6.34 Hz; leaves ");
+    assert!(text.contains(&line), "{line}: {text}");
+    let reason = &chosen[0]["reason"];
+    assert!((0.005..=0.0501).contains(&number(reason, "worst_residual")));
+    assert!((0.1..=0.3).contains(&number(reason, "reach")));
+}
+
+#[test]
 fn run_says_which_modes_act_on_which_axes() {
     let here = TempDir::new().unwrap();
     let robot = here.path().join("robot.toml");

@@ -328,6 +328,27 @@ fn every_word_has_the_same_bits() {
     }
 }
 
+/// Prefilters that come and go with the axes of the moves.
+#[test]
+fn a_program_of_modes_along_axes_has_the_same_bits() {
+    let mut config = RobotConfig::default();
+    config
+        .set_all("axes=x prefilter2=zv frequency2=9.1 damping2=0.01 axes2=yz")
+        .expect("these settings exist");
+    // so few changes that all of the program is queued before it starts
+    for program in [
+        CORNER_PATH,
+        "G0 X220 Y0 Z0\nG1 X240 F9000\nY20\nX230 Y30\nG2 X230 Y20 I0 J-5\nG1 X225\nM2\n",
+        "G0 X220 Y0 Z0\nG1 Z10 F9000\nY20\nX230\nC20\nM2\n",
+        "G0 X220 Y0 Z0\nG1 X240 F9000\nM103 X220 Y10 Q10 R20\nM2\n",
+    ] {
+        let Some(ticks) = ticks_alike(&config, program) else {
+            return;
+        };
+        println!("{ticks} ticks are the same on both");
+    }
+}
+
 /// Changes of the prefilter on the way and at rest, corners between them, and an arc.
 #[test]
 fn a_program_with_a_map_has_the_same_bits() {

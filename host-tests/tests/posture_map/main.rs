@@ -1,5 +1,6 @@
 //! Programs on a robot whose mode depends on the posture, and which has a map of it.
 
+mod automatic;
 mod promises;
 mod residual;
 mod support;
