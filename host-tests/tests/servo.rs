@@ -186,7 +186,8 @@ proptest! {
 
 #[test]
 fn a_servo_is_refused_by_the_name_of_its_setting() {
-    let wrong: [(&str, fn(&mut ServoConfig)); 5] = [
+    type Change = fn(&mut ServoConfig);
+    let wrong: [(&str, Change); 5] = [
         ("position_gain", |config| config.gains.position_gain = 0.0),
         ("integral_time_s", |config| {
             config.gains.integral_time_s = f32::NAN;

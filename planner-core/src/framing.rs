@@ -7,6 +7,9 @@ const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 const CRC_BYTES: usize = 4;
 
+/// Words of a numbered frame at the most.
+const LONGEST_WORDS: usize = 5;
+
 /// Bytes on the wire of a frame with such a body, the closing zero included.
 #[must_use]
 pub const fn wire_bytes(body_bytes: usize) -> usize {
@@ -39,9 +42,6 @@ pub fn encode_numbered<const VALUES: usize, const WIRE: usize>(
     words.extend(core::iter::once(sequence.to_le_bytes()).chain(values));
     encode(words.as_flattened())
 }
-
-/// Words of a numbered frame at the most.
-const LONGEST_WORDS: usize = 5;
 
 /// The number and the values in a body of that length; none if a value is no finite number.
 #[must_use]

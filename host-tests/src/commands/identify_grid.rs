@@ -53,7 +53,7 @@ pub fn survey(
     };
     let excitation: Excitation = args.excite.parse().map_err(Error::from)?;
     let grid = match grid {
-        Grid::Given(map) => *map,
+        Grid::Given(map) => **map,
         Grid::OfTheMap => {
             let map = asked_map(session).map_err(|error| Failure::new(LINK, error))?;
             map.filter(ModeMapConfig::is_some).ok_or_else(|| {

@@ -5,12 +5,12 @@ use std::str::FromStr;
 use planner_core::posture::{MapError, MapNode, ModeMap, ModeMapConfig};
 
 /// The grid of a survey.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Grid {
     /// That of the controller's map.
     OfTheMap,
     /// A map of which only the places count.
-    Given(ModeMapConfig),
+    Given(Box<ModeMapConfig>),
 }
 
 /// Why a text is no grid.
@@ -40,7 +40,7 @@ impl FromStr for Grid {
         let mut checked = map;
         checked.nodes.fill(MapNode::new(10.0, 0.0));
         ModeMap::new(&checked)?;
-        Ok(Self::Given(map))
+        Ok(Self::Given(Box::new(map)))
     }
 }
 

@@ -191,7 +191,7 @@ fn the_firmware_maps_its_mode_and_stills_it_at_both_ends() {
         panic!("a grid");
     };
     let survey = Survey {
-        grid,
+        grid: *grid,
         excitation: "X40 F9600".parse().unwrap(),
         command: "$ID",
     };

@@ -69,7 +69,7 @@ fn survey(grid: &str) -> Survey<'static> {
         panic!("{grid} is a grid");
     };
     Survey {
-        grid,
+        grid: *grid,
         excitation: "X40 F9600".parse().unwrap(),
         command: "$ID",
     }

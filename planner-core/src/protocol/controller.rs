@@ -1224,9 +1224,9 @@ impl Controller<'_, '_> {
     fn restore_defaults(&mut self, restore: Restore) {
         let all = restore == Restore::All;
         // What is forgotten as a whole need not be kept before.
-        let has_settings = all || restore == Restore::Settings;
-        let is_adopted = has_settings && self.adopt(&Settings::default());
-        if is_adopted && !all {
+        let sets = all || restore == Restore::Settings;
+        let is_set = sets && self.adopt(&Settings::default());
+        if is_set && !all {
             self.out(Out::Keep(Record::Settings));
             self.out(Out::Keep(Record::Map));
             self.out(Out::Keep(Record::Servos));
