@@ -2,7 +2,7 @@
 
 use core::array;
 
-use crate::arcs::{ARC_CHANNELS, ArcFilters, Arcs};
+use crate::arcs::{ArcFilter, Arcs};
 use crate::changeover::Changeover;
 use crate::config::Robot;
 use crate::joint_space::{self, Space};
@@ -123,7 +123,7 @@ impl From<&Robot> for MotionSettings {
 #[derive(Debug, Default)]
 pub struct DelayLines {
     lines: ConvolverPair<AXES>,
-    arcs: ArcFilters,
+    arcs: ArcFilter,
 }
 
 impl DelayLines {
@@ -132,7 +132,7 @@ impl DelayLines {
     pub const fn new() -> Self {
         Self {
             lines: ConvolverPair::new(),
-            arcs: [const { Convolver::new() }; ARC_CHANNELS],
+            arcs: Convolver::new(),
         }
     }
 }

@@ -181,12 +181,12 @@ pub struct Bow {
     radius: i32,
     /// Angle at the start in 2^-32 turns.
     start: u32,
-    /// Sweep in 2^-32 turns, up to a full turn either way.
-    sweep: i64,
+    /// Sweep in 2^-30 turns, up to a full turn either way: to 3e-9 rad.
+    sweep: i32,
     /// `R [cos, sin](θ₀)` in 2^-32 mm.
     origin: [i64; 2],
-    /// `C` in 2^-32 mm.
-    chord: [i64; 2],
+    /// `C`.
+    chord: [Wide; 2],
 }
 
 /// 2^-32 turns a radian.
@@ -196,41 +196,79 @@ impl Bow {
     fn new(arc: &Arc) -> Self {
         let radius = libm::round(arc.radius_mm * f64::from(1 << 19)) as i32;
         let start = libm::round(arc.start_angle_rad * TURNS_PER_RAD) as i64 as u32;
-        let sweep = libm::round(arc.sweep_rad * TURNS_PER_RAD) as i64;
+        let sweep = libm::round(arc.sweep_rad * (TURNS_PER_RAD / 4.0)) as i32;
         let origin = on_circle(radius, start);
-        let [x1, y1] = on_circle(radius, start.wrapping_add(sweep as u32));
+        let [x1, y1] = on_circle(radius, start.wrapping_add((sweep as u32) << 2));
         Self {
             radius,
             start,
             sweep,
             origin,
-            chord: [x1 - origin[0], y1 - origin[1]],
+            chord: [Wide::new(x1 - origin[0]), Wide::new(y1 - origin[1])],
+        }
+    }
+
+    /// The same, value by value: the tick that takes it over has no time for `memmove`.
+    #[must_use]
+    pub fn copied(&self) -> Self {
+        let Self {
+            radius,
+            start,
+            sweep,
+            origin,
+            chord,
+        } = *self;
+        Self {
+            radius,
+            start,
+            sweep,
+            origin,
+            chord,
         }
     }
 
     /// The bow in X and Y, in 2^-32 mm, after `progress` in 2^-30 of the segment.
     #[must_use]
     pub fn at(&self, progress: i32) -> [i64; 2] {
-        let turned = (self.sweep * i64::from(progress)) >> 30;
+        let turned = (i64::from(self.sweep) * i64::from(progress)) >> 28;
         let [x, y] = on_circle(self.radius, self.start.wrapping_add(turned as u32));
         [
-            x - self.origin[0] - part(self.chord[0], progress),
-            y - self.origin[1] - part(self.chord[1], progress),
+            x - self.origin[0] - self.chord[0].part(progress),
+            y - self.origin[1] - self.chord[1].part(progress),
         ]
     }
 }
 
 /// `R [cos, sin]` in 2^-32 mm for a radius in 2^-19 mm.
+#[inline(always)]
 fn on_circle(radius: i32, turns: u32) -> [i64; 2] {
     let (sin, cos) = sin_cos(turns);
     let scaled = |value: i32| (i64::from(radius) * i64::from(value)) >> (19 + 30 - 32);
     [scaled(cos), scaled(sin)]
 }
 
-/// The part `progress` (2^-30) of a length in 2^-32 mm: in two halves, so that the product
-/// fits and the whole length comes out exactly.
-fn part(length: i64, progress: i32) -> i64 {
-    let (high, low) = (length >> 13, length & 0x1FFF);
-    let progress = i64::from(progress);
-    ((high * progress) >> (30 - 13)) + ((low * progress) >> 30)
+/// A length of up to ±8192 mm in 2^-32 mm, in two halves that a product of 32 bits takes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Wide {
+    high: i32,
+    low: u16,
+}
+
+impl Wide {
+    const LOW_BITS: u32 = 14;
+
+    fn new(length: i64) -> Self {
+        Self {
+            high: (length >> Self::LOW_BITS) as i32,
+            low: (length & ((1 << Self::LOW_BITS) - 1)) as u16,
+        }
+    }
+
+    /// The part `progress` (2^-30) of it in 2^-32 mm; the whole length comes out exactly.
+    fn part(self, progress: i32) -> i64 {
+        let high = (i64::from(self.high) * i64::from(progress)) >> (30 - Self::LOW_BITS);
+        // of the lower half the upper bits of the progress are enough: the product has 28 bits
+        let low = (i32::from(self.low) * (progress >> 16)) >> (30 - 16);
+        high + i64::from(low)
+    }
 }

@@ -408,12 +408,17 @@ impl<'q> Walker<'q> {
 
     /// Goes on along the segment under way for a tick, or to its end if that comes before.
     fn go_on(&mut self, kernel: &Kernel) -> Gone {
-        let (Walk::Moving(way), Some(segment)) = (&mut self.walk, self.queue.segment()) else {
-            return Gone {
-                ended: false,
-                moved: false,
-                left: ONE_TICK,
-            };
+        let standing = Gone {
+            ended: false,
+            moved: false,
+            left: ONE_TICK,
+        };
+        // one after the other: the tick in which a segment begins is the dearest
+        let Walk::Moving(way) = &mut self.walk else {
+            return standing;
+        };
+        let Some(segment) = self.queue.segment() else {
+            return standing;
         };
         if self.held && !segment.is_hop {
             way.since_corner = way.since_corner.wrapping_add(ONE_TICK);

@@ -111,8 +111,11 @@ fn deltas(bench: &mut Bench, filters: &mut DelayLines) {
     let worst = bench.run(&delta, DELTA_PROGRAM, filters, 100);
     bench.print(format_args!("tick/delta"), worst.tick);
     bench.print(format_args!("line/delta"), worst.line);
-    let worst = bench.run(&delta, DELTA_ARCS, filters, 100);
-    bench.print(format_args!("tick/delta-arcs"), worst.tick);
+    for (filter, frequency_hz) in [("", 6.34), ("-0.1s", 20.0)] {
+        let robot = self::delta(Kind::FirZvd, frequency_hz);
+        let worst = bench.run(&robot, DELTA_ARCS, filters, 100);
+        bench.print(format_args!("tick/delta-arcs{filter}"), worst.tick);
+    }
     for (name, robot, pose) in [
         (
             "scara",

@@ -65,7 +65,10 @@ pub struct Delta {
     pub(super) offset_mm: f32,
     pub(super) upper_arm_mm: f32,
     pub(super) forearm_mm: f32,
-    slowest_root_mm: f32,
+    /// The smallest `s` that joint speeds are computed with, LengthMm.
+    slowest_root: i32,
+    /// `l1` in mm times the resolution of a LengthMm: what a `s` of such units is multiplied by.
+    upper_arm_mm_lsb: f32,
 }
 
 /// One arm at a pose, LengthMm.
@@ -90,14 +93,12 @@ impl Limb {
         atan2(self.half.1, self.half.0).wrapping_add(2) >> 2
     }
 
-    /// `(sin θ, cos θ)`, from the half angle.
+    /// `(sin θ, cos θ)`, from the half angle; zeros without one.
     pub(super) fn sine_cosine(&self) -> (f32, f32) {
-        let (h, k) = (
-            self.half.0 as f32 * MM_PER_LSB,
-            self.half.1 as f32 * MM_PER_LSB,
-        );
+        let (h, k) = (self.half.0 as f32, self.half.1 as f32);
         let (hh, kk) = (h * h, k * k);
-        let per = 1.0 / at_least(hh + kk, f32::MIN_POSITIVE);
+        // which adds nothing to the square of a whole number but 0
+        let per = 1.0 / (hh + kk + f32::MIN_POSITIVE);
         (2.0 * h * k * per, (hh - kk) * per)
     }
 }
@@ -141,7 +142,8 @@ impl Delta {
             offset_mm,
             upper_arm_mm: config.upper_arm_mm,
             forearm_mm: config.forearm_mm,
-            slowest_root_mm: config.forearm_mm * SINE_MIN,
+            slowest_root: length(config.forearm_mm * SINE_MIN),
+            upper_arm_mm_lsb: config.upper_arm_mm * MM_PER_LSB,
         })
     }
 
@@ -167,7 +169,10 @@ impl Delta {
 
     /// The three arms at a pose.
     pub(super) fn limbs(&self, pose: &Pose) -> [Limb; ARMS] {
-        let [x, y, z] = place(pose);
+        self.limbs_at(place(pose))
+    }
+
+    fn limbs_at(&self, [x, y, z]: [i32; 3]) -> [Limb; ARMS] {
         let square = |length: i32| i64::from(length) * i64::from(length);
         // Below 2^62: three squares below 2^60 and lengths of up to 2000 mm.
         let sum = square(x) + square(y) + square(z) + self.constant;
@@ -222,10 +227,11 @@ impl Delta {
         velocity: [f32; AXES],
         acceleration: [f32; AXES],
     ) -> JointState {
-        let limbs = self.limbs(pose);
+        let place = place(pose);
+        let limbs = self.limbs_at(place);
         let [vx, vy, vz, vc] = velocity;
         let [ax, ay, az, ac] = acceleration;
-        let [x, y, z] = place(pose).map(|bits| bits as f32 * MM_PER_LSB);
+        let [x, y, z] = place.map(|bits| bits as f32 * MM_PER_LSB);
 
         // What the arms share of f·v and f·a + v².
         let shared_velocity = x * vx + y * vy + z * vz;
@@ -243,8 +249,7 @@ impl Delta {
             let (sine, cosine) = limb.sine_cosine();
             let lever = self.offset_mm + self.upper_arm_mm * cosine;
             let drop = self.upper_arm_mm * sine;
-            let root = at_least(limb.root as f32 * MM_PER_LSB, self.slowest_root_mm);
-            let per = 1.0 / (self.upper_arm_mm * root);
+            let per = 1.0 / (self.upper_arm_mm_lsb * limb.root.max(self.slowest_root) as f32);
             *rate = (shared_velocity - u_velocity * lever + vz * drop) * per;
             // -2 t·v + m θ'
             let turning =
@@ -260,12 +265,6 @@ impl Delta {
             acceleration: accelerations,
         }
     }
-}
-
-/// The larger of two numbers: a comparison, where `f32::max` calls a function for numbers that
-/// are none.
-fn at_least(value: f32, least: f32) -> f32 {
-    if value > least { value } else { least }
 }
 
 /// `u` of an arm, 1 to 3.
