@@ -307,6 +307,7 @@ impl Robot {
 
     /// Goes on with the prefilters that a path along these axes needs: of a mode along other axes
     /// there is nothing to suppress. Whether that is another prefilter than the one in force.
+    #[inline(never)]
     pub fn suit(&mut self, along: AxisSet) -> bool {
         let config = &self.config.prefilter;
         if config.modes_along(along) == config.modes_along(self.along) {

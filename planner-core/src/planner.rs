@@ -486,6 +486,7 @@ impl<'q> Planner<'q> {
     ///
     /// One that is needed is added wherever that is; one that is not needed any more is left
     /// out only where the path stands anyway.
+    #[inline(never)]
     fn suit_axes(&mut self, command: &Command) -> Result<Option<[Timing; 2]>, Cause> {
         let before = self.robot.along;
         let along = match (&command.robot, command.moves().next()) {
