@@ -38,10 +38,14 @@ fn one_place_after_the_other_and_a_grid() {
         assert!(error.abs() < 0.01, "{way}: {found}");
     }
 
-    // The tool is light: the drives tell of the joints' own mode.
+    // The tool is so light that the drives may just tell of it, or of the joints' own mode alone.
     let found = identify(&["--by", "joint1", "--move", "Y40 F9600"]);
     let found_hz = found["frequency_hz"].as_f64().unwrap();
-    assert!((34.0..37.0).contains(&found_hz), "{found}");
+    let error = found_hz / frequency_hz(220.0, 40.0) - 1.0;
+    assert!(
+        error.abs() < 0.01 || (34.0..37.0).contains(&found_hz),
+        "{found}"
+    );
 
     let found = identify(&["--grid", "2,1,180,280,-1,1", "--store"]);
     assert_eq!((&found["columns"], &found["rows"]), (&2.into(), &1.into()));
