@@ -4,7 +4,7 @@
 use host_tests::checker::limits::{Arm, Geometry, JointRow, Rates, rates};
 use host_tests::checker::{CheckOptions, Program, TraceRow, check};
 use host_tests::random_program::{Shape, random_program};
-use host_tests::software_loop::{Controller, ProgramError, limited_feeds, run};
+use host_tests::software_loop::{Controller, ProgramError, plan, run};
 use host_tests::trace::{joints, pose};
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::hop::HopAxes;
@@ -888,7 +888,7 @@ fn a_hop_that_a_limit_slows_down_says_so() {
     const PROGRAM: &str = "G0 X200 Y0\nM103 X240 Y20 Z5\nM2";
     let hop = |limits: &str| {
         let robot = robot(|config| config.set_all(limits).expect("settings that exist"));
-        let limited = limited_feeds(&robot, PROGRAM).expect("it hops");
+        let limited = plan(&robot, PROGRAM).expect("it hops").limited;
         let ticks = setpoints(&robot, PROGRAM).len();
         (limited, ticks)
     };
