@@ -780,11 +780,17 @@ impl<'q> Planner<'q> {
             slowdown: Some(slowdown),
             ..*limits
         };
-        let [start, target] = [&order.start, &order.target];
-        let peaks = |slowdown| hop::peaks(start, target, wanted, &slowed(slowdown));
-        let rise = LengthMm::saturating_from_num(wanted.rise_mm);
-        let top = start.z.max(target.z).saturating_add(rise);
-        let found = self.robot.limits.hop_slowdown([start, target], top, peaks);
+        let (start, target) = (order.start, order.target);
+        let peaks = |slowdown| hop::peaks(&start, &target, wanted, &slowed(slowdown));
+        let low = start.z.min(target.z);
+        let across = PathSegment {
+            start: Pose { z: low, ..start },
+            target: Pose { z: low, ..target },
+            shape: Shape::Line,
+        };
+        let course = Course::new(&across, self.robot.limits.kind());
+        let rise_mm = wanted.rise_mm + (start.z.max(target.z) - low).to_num::<f32>();
+        let found = self.robot.limits.hop_slowdown(&course, rise_mm, peaks);
         let (asked, takes) = (peaks(1.0), peaks(found.slowdown));
         let limited = found.bound.map(|bound| Limited {
             bound,

@@ -55,9 +55,10 @@ fn default_robot() -> (Delta, Geometry) {
 fn line(from: [f64; 3], to: [f64; 3], rise_mm: f64) -> Sweep {
     let way: [f64; 3] = std::array::from_fn(|axis| to[axis] - from[axis]);
     let length_mm = dot(way, way).sqrt();
-    Sweep::new(length_mm as f32, 0.0, rise_mm as f32, |u| {
+    let curve = Sweep::new(length_mm as f32, 0.0, |u| {
         std::array::from_fn(|axis| (from[axis] + f64::from(u) * way[axis]) as f32)
-    })
+    });
+    curve.raised(rise_mm as f32)
 }
 
 fn bounds_of(delta: &Delta, sweep: &Sweep, reach_mm: f32) -> [RateBounds; 3] {
@@ -80,12 +81,12 @@ fn norms_bound_the_derivatives_and_are_met() {
         forearm_mm: forearm,
         ..DeltaConfig::default()
     };
-    for config in [
-        DeltaConfig::default(),
-        robot(60.0, 20.0, 80.0, 210.0),
-        robot(50.0, 50.0, 300.0, 500.0),
-        robot(180.0, 45.0, 400.0, 420.0),
-        robot(200.0, 50.0, 500.0, 300.0),
+    for (config, third) in [
+        (DeltaConfig::default(), 1.8..2.1),
+        (robot(60.0, 20.0, 80.0, 210.0), 1.05..2.5),
+        (robot(50.0, 50.0, 300.0, 500.0), 1.05..3.0),
+        (robot(180.0, 45.0, 400.0, 420.0), 1.05..4.0),
+        (robot(200.0, 50.0, 500.0, 300.0), 1.05..4.0),
     ] {
         let (delta, geometry) = (Delta::new(&config).unwrap(), Geometry::of(&config));
         let reach = geometry.upper_arm + geometry.forearm;
@@ -121,7 +122,7 @@ fn norms_bound_the_derivatives_and_are_met() {
         println!("bounds by derivatives at {count} places: {loosest:.3?}");
         assert!(count > 30, "{count} places: {config:?}");
         assert!(loosest[0] < 1.02 && loosest[1] < 1.03, "{loosest:?}");
-        assert!((1.05..2.2).contains(&loosest[2]), "{loosest:?}");
+        assert!(third.contains(&loosest[2]), "{loosest:?}");
     }
 }
 
@@ -204,7 +205,7 @@ proptest! {
             [centre[0] + radius * cos, centre[1] + radius * sin, centre[2]]
         };
         let length_mm = (radius * sweep.abs()) as f32;
-        let way = Sweep::new(length_mm, 1.0 / radius as f32, 0.0, |u| {
+        let way = Sweep::new(length_mm, 1.0 / radius as f32, |u| {
             at(f64::from(u)).map(|v| v as f32)
         });
         for (k, bound) in bounds_of(&delta, &way, 0.0).iter().enumerate() {

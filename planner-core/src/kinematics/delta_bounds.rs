@@ -62,15 +62,9 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// The curve that is `at(u)` for `u` from 0 to 1, of such a length and largest curvature, and
-    /// what is above it up to `rise_mm`.
+    /// The curve that is `at(u)` for `u` from 0 to 1, of such a length and largest curvature.
     #[must_use]
-    pub fn new(
-        length_mm: f32,
-        curvature_per_mm: f32,
-        rise_mm: f32,
-        at: impl Fn(f32) -> [f32; 3],
-    ) -> Self {
+    pub fn new(length_mm: f32, curvature_per_mm: f32, at: impl Fn(f32) -> [f32; 3]) -> Self {
         let pieces = ((length_mm / PIECE_MM) as usize).clamp(1, PIECES);
         let per = 1.0 / pieces as f32;
         let mut stations = [[0.0; 3]; PIECES + 1];
@@ -83,8 +77,14 @@ impl Sweep {
             pieces,
             // the sagitta of an arc
             bent_mm: 0.125 * curvature_per_mm * piece_mm * piece_mm,
-            rise_mm,
+            rise_mm: 0.0,
         }
+    }
+
+    /// The same with all that is above it up to a height.
+    #[must_use]
+    pub fn raised(self, rise_mm: f32) -> Self {
+        Self { rise_mm, ..self }
     }
 
     fn stations(&self) -> impl Iterator<Item = &[f32; 3]> {
@@ -174,7 +174,8 @@ impl DeltaBounds {
     /// Bounds for the three arms, wherever the tool is within `reach_mm` of what it passes. Finite
     /// everywhere.
     ///
-    /// Exact for g and H where the region is a point, and D there at most twice what it has to be.
+    /// Exact for g and H where the region is a point. D is there at most twice what it has to be for
+    /// the default robot, and four times where forearms are shorter than upper arms.
     /// Cost on a Cortex-M4F: some 1800 instructions a piece, of which a way has up to 6.
     #[must_use]
     pub fn within(&self, spans: &Spans, reach_mm: f32) -> [RateBounds; ARMS] {

@@ -13,6 +13,16 @@ pub enum Region {
     Sweep(Sweep),
 }
 
+impl Region {
+    /// The same with all that is above it up to a height.
+    pub(super) fn raised(self, rise_mm: f32) -> Self {
+        match self {
+            Self::Ring(_) => self,
+            Self::Sweep(sweep) => Self::Sweep(sweep.raised(rise_mm)),
+        }
+    }
+}
+
 /// A segment as the limits see it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Course {
@@ -59,7 +69,7 @@ impl Course {
         let region = match (kind, path.shape) {
             (ArmKind::Delta, Shape::Line) => {
                 let [way_x, way_y, way_z] = [0, 1, 2].map(|axis: usize| end[axis] - start[axis]);
-                Region::Sweep(Sweep::new(length_mm, 0.0, 0.0, |u| {
+                Region::Sweep(Sweep::new(length_mm, 0.0, |u| {
                     [
                         start[0] + u * way_x,
                         start[1] + u * way_y,
@@ -68,7 +78,7 @@ impl Course {
                 }))
             }
             (ArmKind::Delta, Shape::Arc(_)) => {
-                Region::Sweep(Sweep::new(length_mm, curvature_per_mm, 0.0, |u| {
+                Region::Sweep(Sweep::new(length_mm, curvature_per_mm, |u| {
                     let [x, y, z, _] = at(f64::from(u));
                     [x, y, z]
                 }))
@@ -104,7 +114,7 @@ impl Course {
 }
 
 /// The radii along a straight line.
-pub(super) fn ring_of_line(from: [f32; 2], to: [f32; 2]) -> Ring {
+fn ring_of_line(from: [f32; 2], to: [f32; 2]) -> Ring {
     let (start_mm, end_mm) = (root(from[0], from[1]), root(to[0], to[1]));
     let way = [to[0] - from[0], to[1] - from[1]];
     let length_squared = way[0] * way[0] + way[1] * way[1];

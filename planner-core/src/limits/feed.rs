@@ -480,7 +480,10 @@ fn between((above_s, above): (f32, f32), (below_s, below): (f32, f32)) -> f32 {
 }
 
 /// Where a segment is, as bounds on the joints are computed from it.
-#[expect(clippy::large_enum_variant, reason = "one at a time is on the stack")]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one at a time, and no allocator to box it with"
+)]
 pub(super) enum Place {
     Ring(Ring),
     Spans(Spans),

@@ -11,18 +11,17 @@
 //! g v ≤ V,   g a + h v² ≤ A,   g j + 3 h v a + d v³ ≤ J
 //! ```
 //!
-//! keep the limits of each joint, less what the resolution of axes adds that nothing smooths, `v`, `a`, `j` being those across for a SCARA, and the roots of
-//! the sums of the squares of those across and vertical for a delta robot. If all motions take `k`
-//! times as long, the left sides are at most `1/k`, `1/k²` and `1/k³` of what they were.
+//! keep the limits of each joint: `v`, `a`, `j` are those across for a SCARA, and the roots of the
+//! sums of the squares of those across and vertical for a delta robot. Of A goes what the
+//! resolution adds where nothing smooths an axis. If all motions take `k` times as long, the left
+//! sides are at most `1/k`, `1/k²` and `1/k³` of what they were.
 
 use super::config::{Bound, Order, Part};
-use super::course::{Region, ring_of_line};
+use super::course::Course;
 use super::feed::{Highest, Limits};
 use crate::hop::HopPeaks;
-use crate::kinematics::{ArmKind, RateBounds, Sweep};
+use crate::kinematics::{ArmKind, RateBounds};
 use crate::math::sqrt_f32;
-use crate::pose::Pose;
-use crate::units::LengthMm;
 
 /// Steps to a slow-down; times are whole ticks, so that a step can fail to be enough.
 const ROUNDS: usize = 64;
@@ -43,39 +42,25 @@ pub struct HopSlowdown {
 type Found = (f32, Option<Bound>);
 
 impl Limits {
-    /// How many times as long the motions of a hop between two poses have to take, that rises to
-    /// `top` and has such peaks when slowed down so.
+    /// How many times as long the motions of a hop have to take, that goes across as `course` says,
+    /// at its lowest height, rises by `rise_mm` over that and has such peaks when slowed down so.
     ///
     /// Cost on a Cortex-M4F: some 10 000 instructions a round, of which there are few.
     #[must_use]
     #[inline(never)]
     pub fn hop_slowdown(
         &self,
-        [start, target]: [&Pose; 2],
-        top: LengthMm,
+        course: &Course,
+        rise_mm: f32,
         peaks: impl Fn(f64) -> HopPeaks,
     ) -> HopSlowdown {
-        let mm = |pose: &Pose| [pose.x, pose.y, pose.z].map(|value| value.to_num::<f32>());
-        let ([x0, y0, z0], [x1, y1, z1]) = (mm(start), mm(target));
-        let (dx, dy) = (x1 - x0, y1 - y0);
-        let length_mm = sqrt_f32(dx * dx + dy * dy);
-        let region = match self.kind() {
-            ArmKind::Scara => Region::Ring(ring_of_line([x0, y0], [x1, y1])),
-            ArmKind::Delta => {
-                let low_mm = z0.min(z1);
-                let rise_mm = (top.to_num::<f32>() - low_mm).max(0.0);
-                Region::Sweep(Sweep::new(length_mm, 0.0, rise_mm, |u| {
-                    [x0 + u * dx, y0 + u * dy, low_mm]
-                }))
-            }
-        };
-        let bounds = self.bounds(&self.place(&region), 0.0);
-        let per_mm = if length_mm > 0.0 {
-            1.0 / length_mm
+        let bounds = self.bounds(&self.place(&course.region.raised(rise_mm)), 0.0);
+        let [x_mm, y_mm, _] = course.axes_mm;
+        let share = if course.plane_mm > 0.0 {
+            x_mm.max(y_mm) / course.plane_mm
         } else {
             0.0
         };
-        let share = dx.abs().max(dy.abs()) * per_mm;
         let mut found = HopSlowdown {
             slowdown: 1.0,
             bound: None,
@@ -108,40 +93,41 @@ impl Limits {
             sqrt_f32(across * across + vertical * vertical)
         });
         let [turn1, turn2, turn3] = bounds;
-        let [joint1, joint2, joint3, joint4] = &self.joints;
-        let along = across.map(|peak| peak * share);
-        let mut worst: Found = (1.0, None);
-        let mut take = |part, peaks: [f32; 3], grain: f32, highest: &Highest| {
-            let found = longer(part, peaks, grain, highest);
-            if found.0 > worst.0 {
-                worst = found;
-            }
+        let (yaw_grain, along) = (grain.to_radians(), across.map(|peak| peak * share));
+        let turn = |joint, bounds: &RateBounds, peaks| {
+            let grain = bounds.first * grain;
+            (Part::Joint(joint), turned(bounds, peaks), grain)
         };
-        take(Part::Path, both, grain, &self.path);
-        take(Part::Axis, along, grain, &self.axis);
-        take(Part::Axis, vertical, grain, &self.axis);
-        let yaw_grain = grain.to_radians();
-        let mut turn = |joint, bounds: &RateBounds, peaks, highest| {
-            let peaks = turned(bounds, peaks);
-            take(Part::Joint(joint), peaks, bounds.first * grain, highest);
-        };
-        match self.kind() {
+        let joints = match self.kind() {
             ArmKind::Scara => {
-                turn(1, turn1, across, joint1);
-                turn(2, turn2, across, joint2);
-                take(Part::Joint(3), vertical, grain, joint3);
-                let mut sum = turned(turn3, across);
+                let (part, mut sum, grain4) = turn(4, turn3, across);
                 for (peak, yaw) in sum.iter_mut().zip(yaw) {
                     *peak += yaw;
                 }
-                let sum_grain = turn3.first * grain + yaw_grain;
-                take(Part::Joint(4), sum, sum_grain, joint4);
+                [
+                    turn(1, turn1, across),
+                    turn(2, turn2, across),
+                    (Part::Joint(3), vertical, grain),
+                    (part, sum, grain4 + yaw_grain),
+                ]
             }
-            ArmKind::Delta => {
-                turn(1, turn1, both, joint1);
-                turn(2, turn2, both, joint2);
-                turn(3, turn3, both, joint3);
-                take(Part::Joint(4), yaw, yaw_grain, joint4);
+            ArmKind::Delta => [
+                turn(1, turn1, both),
+                turn(2, turn2, both),
+                turn(3, turn3, both),
+                (Part::Joint(4), yaw, yaw_grain),
+            ],
+        };
+        let tool = [
+            ((Part::Path, both, grain), &self.path),
+            ((Part::Axis, along, grain), &self.axis),
+            ((Part::Axis, vertical, grain), &self.axis),
+        ];
+        let mut worst: Found = (1.0, None);
+        for ((part, peaks, grain), highest) in joints.into_iter().zip(&self.joints).chain(tool) {
+            let found = longer(part, peaks, grain, highest);
+            if found.0 > worst.0 {
+                worst = found;
             }
         }
         worst

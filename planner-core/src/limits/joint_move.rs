@@ -66,3 +66,34 @@ impl Limits {
         (asked_s * worst.0, worst.1)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{Robot, RobotConfig};
+    use crate::kinematics::ArmKind;
+    use crate::limits::Order;
+
+    #[test]
+    fn the_joints_of_a_delta_keep_their_own_limits() {
+        let mut config = RobotConfig {
+            arm: ArmKind::Delta,
+            ..RobotConfig::default()
+        };
+        config
+            .set_all("joint3-velocity=50 joint4-velocity=1000 path-velocity=1")
+            .unwrap();
+        let robot = Robot::new(&config).unwrap();
+        let (duration_s, bound) = robot.limits.joint_move_s([0.5, 0.2, 1.0, 0.3], 0.1);
+        let least_s = 1.0 / 50_f32.to_radians();
+        assert!(
+            (1.0..1.001).contains(&(duration_s / least_s)),
+            "{duration_s}"
+        );
+        let expected = Bound {
+            part: Part::Joint(3),
+            order: Order::Velocity,
+        };
+        assert_eq!(bound, Some(expected));
+    }
+}
