@@ -63,6 +63,8 @@ impl Arcs {
 
     /// Takes this tick's step of the raw path; returns the sum of the bows in X and Y, in
     /// 2^-32 mm.
+    // within the tick it would spill registers of the lines' filter
+    #[inline(never)]
     pub fn step(
         &mut self,
         filters: &mut ArcFilters,
