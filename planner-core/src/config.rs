@@ -312,9 +312,14 @@ impl Robot {
     #[must_use]
     pub fn prefilter(&self) -> Prefilter {
         let mut prefilter = Prefilter::NONE;
-        // one of this tuning has been made before: this does not fail
-        let _ = make_prefilter(&mut prefilter, &self.config, &self.arm, &self.tuning);
+        self.put_prefilter(&mut prefilter);
         prefilter
+    }
+
+    /// Makes the prefilter in its place, where the stack has no room for a copy.
+    pub(crate) fn put_prefilter(&self, prefilter: &mut Prefilter) {
+        // one of this tuning has been made before: this does not fail
+        let _ = make_prefilter(prefilter, &self.config, &self.arm, &self.tuning);
     }
 
     /// The boxes that the prefilter was given because limits need them, in s.

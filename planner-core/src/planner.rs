@@ -648,7 +648,8 @@ impl<'q> Planner<'q> {
             feed_mm_s: config.feed_limit_mm_s,
             yaw_deg_s: config.yaw_limit_deg_s,
         };
-        let prefilter = self.robot.prefilter();
+        let mut prefilter = Prefilter::NONE;
+        self.robot.put_prefilter(&mut prefilter);
         hop::plan(order.start, order.target, wanted, &limits, &prefilter)
     }
 

@@ -114,6 +114,9 @@ fn deltas(bench: &mut Bench, filters: &mut DelayLines) {
         let worst = bench.run(&robot, DELTA_ARCS, filters, 100);
         bench.print(format_args!("tick/delta-arcs{filter}"), worst.tick);
     }
+    let worst = bench.run(&delta, DELTA_HOP, filters, 100);
+    bench.print(format_args!("tick/delta-hop"), worst.tick);
+    bench.print(format_args!("line/delta-hop"), worst.line);
     for (name, robot, pose) in [
         (
             "scara",
@@ -213,6 +216,9 @@ const DELTA_PROGRAM: &str = include_str!("../../../host-tests/programs/delta-pic
 /// Arcs of a delta, two in flight all the time.
 const DELTA_ARCS: &str = "G0 X0 Y0 Z-767\nF9600 G64 P0.5\nG2 X40 Y0 R22\nG3 X80 Y0 R22 Z-750\n\
     G2 X40 Y0 R22\nG3 X0 Y0 R22 Z-767\nM2\n";
+
+/// A pick-and-place move of a delta.
+const DELTA_HOP: &str = include_str!("../../../host-tests/programs/hop.gcode");
 
 /// What the kinematics of a pose cost, in instructions.
 struct ArmCost {
