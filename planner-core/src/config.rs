@@ -353,9 +353,14 @@ impl Robot {
     #[must_use]
     pub fn prefilter(&self) -> Prefilter {
         let mut prefilter = Prefilter::NONE;
-        // one of this tuning has been made before: this does not fail
-        let _ = self.tuning.make(&mut prefilter);
+        self.put_prefilter(&mut prefilter);
         prefilter
+    }
+
+    /// Makes the prefilter in its place, where the stack has no room for a copy.
+    pub(crate) fn put_prefilter(&self, prefilter: &mut Prefilter) {
+        // one of this tuning has been made before: this does not fail
+        let _ = self.tuning.make(prefilter);
     }
 
     /// The boxes that the prefilter was given because limits need them, in s; where it is chosen

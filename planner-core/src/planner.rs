@@ -811,7 +811,8 @@ impl<'q> Planner<'q> {
         wanted: &HopConfig,
         limits: &HopLimits,
     ) -> Result<Hop, HopError> {
-        let prefilter = self.robot.prefilter();
+        let mut prefilter = Prefilter::NONE;
+        self.robot.put_prefilter(&mut prefilter);
         hop::plan(order.start, order.target, wanted, limits, &prefilter)
     }
 

@@ -144,6 +144,9 @@ impl<'q> Schedule<'q> {
     /// planned with a robot that has it.
     ///
     /// `false` if the look-ahead is full.
+    ///
+    /// Not inlined: its frame is on the stack for no more than this.
+    #[inline(never)]
     pub fn plan(
         &mut self,
         robot: &Robot,

@@ -116,6 +116,8 @@ fn deltas(bench: &mut Bench, filters: &mut DelayLines) {
         let worst = bench.run(&robot, DELTA_ARCS, filters, 100);
         bench.print(format_args!("tick/delta-arcs{filter}"), worst.tick);
     }
+    let worst = bench.run(&delta, DELTA_HOP, filters, 100);
+    bench.print(format_args!("tick/delta-hop"), worst.tick);
     for (name, robot, pose) in [
         (
             "scara",
@@ -250,7 +252,7 @@ const SCARA_ARCS: &str =
     "G0 X200 Y0\nF9600\nG2 X240 Y0 R22\nG3 X280 Y0 R22 Z10\nG2 X240 Y0 R22\nM2\n";
 
 /// A pick-and-place move of a delta.
-const DELTA_HOP: &str = "G0 X-350 Y0 Z-767\nM103 X350\nM2\n";
+const DELTA_HOP: &str = include_str!("../../../host-tests/programs/hop.gcode");
 
 /// What the kinematics of a pose cost, in instructions.
 struct ArmCost {

@@ -9,8 +9,11 @@ use host_tests::emulator::{Answer, Board, Emulator, EmulatorError, Pace, build_i
 use host_tests::machine::settings;
 use host_tests::random_program::{Shape, random_program};
 use planner_core::config::RobotConfig;
+use planner_core::hop::HopAxes;
+use planner_core::kinematics::ArmKind;
 use planner_core::motion::MotionState;
 use planner_core::pose::Pose;
+use planner_core::posture::{MapNode, ModeMapConfig};
 use planner_core::prefilter::Kind;
 use planner_core::telemetry::SetpointFrame;
 use planner_core::units::LengthMm;
@@ -282,6 +285,25 @@ fn the_stack_keeps_its_distance_from_the_variables() {
         return;
     };
     let at_boot = emulator.stack_use().unwrap();
+    // a map of the mode, with the prefilter chosen for each move
+    let mut config = RobotConfig {
+        automatic: true,
+        ..RobotConfig::default()
+    };
+    config.map = ModeMapConfig {
+        x_mm: [180.0, 315.0],
+        columns: 2,
+        rows: 1,
+        ..ModeMapConfig::NONE
+    };
+    for (node, hz) in config.map.nodes.iter_mut().zip([9.0, 15.0]) {
+        *node = MapNode::new(hz, 0.022);
+    }
+    let lines: Vec<&str> = include_str!("../../programs/corner-path.gcode")
+        .lines()
+        .collect();
+    emulator.run_program(&settings(&config), &lines).unwrap();
+    println!("stack with a map {:?}", emulator.stack_use().unwrap());
     for kind in [Kind::FirZvd, Kind::Ei, Kind::FirZv] {
         let mut config = RobotConfig::default();
         config.prefilter.kind = kind;
@@ -316,6 +338,29 @@ fn the_stack_keeps_its_distance_from_the_variables() {
     println!("stack at boot {at_boot:?}, at the fullest moment {stack:?}");
     assert!(stack.used_bytes >= at_boot.used_bytes, "{stack:?}");
     assert!(stack.free_bytes >= 1024, "{stack:?}");
+}
+
+/// A hop is the deepest that planning goes.
+#[test]
+fn the_stack_holds_hops() {
+    let on_a_scara = "G0 X250 Y0 Z-20\nM103 X200 Y-80 Q20 R30\nM103 X250 Y0 Q20 R30\nM2";
+    let on_a_delta = include_str!("../../programs/hop.gcode");
+    for (arm, program) in [(ArmKind::Scara, on_a_scara), (ArmKind::Delta, on_a_delta)] {
+        let Some(mut emulator) = emulator(Pace::Free) else {
+            return;
+        };
+        let mut config = RobotConfig {
+            arm,
+            feed_limit_mm_s: 10_000.0,
+            ..RobotConfig::default()
+        };
+        config.hop.axes = HopAxes::All;
+        let lines: Vec<&str> = program.lines().collect();
+        emulator.run_program(&settings(&config), &lines).unwrap();
+        let stack = emulator.stack_use().unwrap();
+        println!("stack on hops of a {arm:?}: {stack:?}");
+        assert!(stack.free_bytes >= 256, "{arm:?}: {stack:?}");
+    }
 }
 
 #[test]

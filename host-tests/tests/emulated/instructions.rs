@@ -153,8 +153,8 @@ fn a_line_that_changes_the_prefilter_is_planned_within_three_milliseconds() {
 #[test]
 fn a_deltas_tick_stays_below_2500_instructions() {
     let Some(counts) = counts() else { return };
-    // on lines, and with two arcs in flight all the time
-    for case in ["delta", "delta-arcs", "delta-arcs-0.1s"] {
+    // on lines, with two arcs in flight all the time, and in a hop
+    for case in ["delta", "delta-arcs", "delta-arcs-0.1s", "delta-hop"] {
         let tick = counts[&format!("tick/{case}")];
         println!("{case}: {tick}");
         assert!((1000..=2500).contains(&tick), "{case}: {tick}");

@@ -17,7 +17,8 @@ use host_tests::machine::settings;
 use host_tests::random_program::{Shape, random_program};
 use host_tests::software_loop::{self, Controller};
 use planner_core::config::{Robot, RobotConfig};
-use planner_core::kinematics::Elbow;
+use planner_core::hop::HopAxes;
+use planner_core::kinematics::{ArmKind, Elbow};
 use planner_core::motion::{DelayLines, MotionState, Setpoint};
 use planner_core::pose::Joint3;
 use planner_core::posture::{MapNode, ModeMapConfig, PostureMethod};
@@ -375,6 +376,39 @@ fn a_program_with_a_map_has_the_same_bits() {
                 return;
             };
             println!("{kind:?}, {method:?}: {ticks} ticks are the same on both");
+        }
+    }
+}
+
+/// A hop's raw path is its own, and the prefilter acts on none, two or all of its axes.
+#[test]
+fn hops_have_the_same_bits() {
+    const SCARA_HOPS: &str = "\
+G21 G90
+G0 X250 Y0 Z-20 C10
+M103 X200 Y-80.5 C-30 Q20 R30
+M103 X251.25 Y60 Z-12.5 Q15 R22 P0.2
+G1 X240 Y60 F6000
+M103 X250 Y0 Q20 R30
+M2
+";
+    const DELTA_HOPS: &str = include_str!("../../programs/hop.gcode");
+    for axes in HopAxes::ALL {
+        for (arm, program, rapid_mm_s) in [
+            (ArmKind::Scara, SCARA_HOPS, 160.0),
+            (ArmKind::Delta, DELTA_HOPS, 1000.0),
+        ] {
+            let mut config = RobotConfig {
+                arm,
+                rapid_mm_s,
+                feed_limit_mm_s: 10_000.0,
+                ..RobotConfig::default()
+            };
+            config.hop.axes = axes;
+            let Some(ticks) = ticks_alike(&config, program) else {
+                return;
+            };
+            println!("{arm:?}, {axes:?}: {ticks} ticks are the same on both");
         }
     }
 }

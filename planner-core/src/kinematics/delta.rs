@@ -219,7 +219,7 @@ impl Delta {
     /// the fastest joint's, accelerations to 2e-6 of the largest among themselves and the
     /// squared velocities. Closer than 0.06° to a serial singularity they are those at 0.06°:
     /// finite for any finite arguments up to 1e6.
-    /// Cost on a Cortex-M4: 1127 instructions.
+    /// Cost on a Cortex-M4: 760 instructions.
     #[must_use]
     pub fn joint_state(
         &self,
