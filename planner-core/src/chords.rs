@@ -20,7 +20,7 @@ use crate::pose::Pose;
 use crate::units::{AngleDeg, LengthMm};
 
 /// Most chords of an arc.
-pub const MOST: usize = 4;
+pub const MOST: usize = 2;
 
 /// What they may stray from it, as a part of the tolerance.
 const SHARE: f64 = 0.15;

@@ -245,21 +245,17 @@ impl Follower {
         config: &FollowConfig<'_>,
     ) -> Result<(), FollowError> {
         check_map(config.map)?;
-        // with as little as can be on the stack, because it looks at many prefilters
-        let shortest = match (config.method, config.shortest) {
-            (PostureMethod::Local, Some(shortest)) => {
-                let modes = config.map.used().iter().map(Mode::from);
-                let found = Shortest::new(modes, &shortest, config.prefilter.v_tol);
-                Some(found.map_err(FollowError::Shortest)?)
-            }
-            _ => None,
-        };
-        Self::put(place, config, shortest)?;
-        if let Some(follower) = place {
-            follower.leave_out_too_long();
-            check_length(&follower.slowest())?;
-            follower.reach_s = follower.longest_reach_s();
-        }
+        Self::put(place, config, shortest(config)?)?;
+        place.as_mut().map_or(Ok(()), Self::fit)
+    }
+
+    /// Leaves out what is too long for the delay line, and takes note of the reach. Not inlined,
+    /// so that what the follower is made of is not on the stack any more.
+    #[inline(never)]
+    fn fit(&mut self) -> Result<(), FollowError> {
+        self.leave_out_too_long();
+        check_length(&self.slowest())?;
+        self.reach_s = self.longest_reach_s();
         Ok(())
     }
 
@@ -449,6 +445,20 @@ impl fmt::Display for Follower {
                 method.name()
             ),
         }
+    }
+}
+
+/// The choice of the shortest prefilter, if that is asked for. Not inlined, because it looks at
+/// many prefilters.
+#[inline(never)]
+fn shortest(config: &FollowConfig<'_>) -> Result<Option<Shortest>, FollowError> {
+    match (config.method, &config.shortest) {
+        (PostureMethod::Local, Some(shortest)) => {
+            let modes = config.map.used().iter().map(Mode::from);
+            let found = Shortest::new(modes, shortest, config.prefilter.v_tol);
+            found.map(Some).map_err(FollowError::Shortest)
+        }
+        _ => Ok(None),
     }
 }
 
