@@ -164,16 +164,16 @@ fn a_deltas_tick_stays_below_2500_instructions() {
 }
 
 #[test]
-fn a_corner_stays_below_115_000_instructions() {
+fn a_corner_stays_below_60_000_instructions() {
     let Some(counts) = counts() else { return };
     for (name, count) in counts {
         if name.starts_with("corner/") {
-            // some corners at arcs that turn far within them are solved twice
+            // the longest cascades of impulses with a box cost more where arcs meet
             let most = match name.as_str() {
-                "corner/none" | "corner/custom" => 1000,
-                "corner/zv" | "corner/zvd" | "corner/zvdd" | "corner/ei" | "corner/mzv" => 60_000,
-                _ => 115_000,
+                "corner/fir-ei" | "corner/fir-mzv" | "corner/fir-3hump-ei" => 70_000,
+                _ => 60_000,
             };
+            println!("{name}: {count}");
             assert!((100..=most).contains(count), "{name}: {count}");
         }
     }
