@@ -526,8 +526,19 @@ impl<'q> Planner<'q> {
         Ok((self.schedule.hop(&hop, order.line), limited))
     }
 
-    /// Queues a move, a short arc of a chain by chords.
+    /// Queues a move, a short arc of a chain by chords unless the prefilter follows a map: the stack
+    /// holds what either needs.
     fn plan_move(&mut self, order: &Move, timing: &Timing) -> bool {
+        let is_arc = matches!(order.path.shape, Shape::Arc(_));
+        if self.robot.follower.is_some() || !is_arc && self.sagitta_mm == 0.0 {
+            return self.plan_segment(order, timing);
+        }
+        self.plan_chords(order, timing)
+    }
+
+    /// Queues an arc, or what follows chords.
+    #[inline(never)]
+    fn plan_chords(&mut self, order: &Move, timing: &Timing) -> bool {
         let order = Move {
             corner: order.corner.tightened(self.sagitta_mm),
             ..*order
