@@ -67,7 +67,7 @@
 //! - **At rest** the next filter is put at the point where everything stands: its window holds
 //!   nothing else.
 //! - **On the way** of a line the command passes over once both windows have seen nothing but
-//!   one even motion on it (see [`crate::changeover`]). Before that instant it is a mean through
+//!   one even motion on it. Before that instant it is a mean through
 //!   the first filter; from it on, through the second one, of a raw path that has always been on
 //!   this line and goes on from where it is now. Both means agree there, with their derivatives,
 //!   but for a rounding of 2^-19 mm, which is faded out. So no window and no pair of instants of
