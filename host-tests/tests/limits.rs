@@ -2,10 +2,10 @@
 //! checker; and nothing stalls because of them.
 
 use host_tests::checker::limits::{Arm, Geometry, JointRow, Rates, rates};
-use host_tests::checker::{CheckOptions, Program, TraceRow, check};
+use host_tests::judged_run::report;
 use host_tests::random_program::{Shape, random_program};
 use host_tests::software_loop::{Controller, ProgramError, plan, run};
-use host_tests::trace::{joints, pose};
+use host_tests::trace::joints;
 use planner_core::config::{Robot, RobotConfig};
 use planner_core::hop::HopAxes;
 use planner_core::kinematics::{ArmKind, JointRange};
@@ -729,23 +729,11 @@ fn the_tolerance_holds_with_limits_too() {
             ..Shape::default()
         };
         let program = random_program(seed, shape);
-        let rows: Vec<_> = setpoints(&robot, &program)
-            .iter()
-            .zip(0_u32..)
-            .map(|(setpoint, tick)| TraceRow {
-                time_s: f64::from(tick) * 1e-3,
-                pose: pose(setpoint),
-            })
-            .collect();
-        let options = CheckOptions {
-            rapid_mm_s: 160.0,
-            tolerance_mm: robot.config.corner_tolerance_mm.into(),
-            ..CheckOptions::default()
-        };
-        let parsed = Program::parse(&program).expect("the checker reads it");
-        let report = check(&parsed, &rows, &options);
+        let report = report(&robot, &program, &setpoints(&robot, &program));
+        let report = report.expect("the checker reads it");
+        let tolerance_mm = f64::from(robot.config.corner_tolerance_mm);
         assert!(
-            report.max_path_deviation_mm <= options.tolerance_mm + 1e-3,
+            report.max_path_deviation_mm <= tolerance_mm + 1e-3,
             "seed {seed}, {kind:?}: {} mm\n{program}",
             report.max_path_deviation_mm
         );

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use host_tests::any_program::{ARM, any_program};
-use host_tests::checker::{Program, TraceRow, tolerance_use};
+use host_tests::checker::{Program, tolerance_use};
+use host_tests::judged_run::rows;
 use host_tests::plant::{IdealPlant, Mode};
 use host_tests::software_loop::run;
 use host_tests::trace::pose;
@@ -352,21 +353,13 @@ fn the_tolerance_holds_on(seeds: std::ops::Range<u64>) {
         };
         let parsed = Program::parse(&program).expect("the checker reads it");
         let all = setpoints(&robot, &program);
-        let rows: Vec<_> = all
-            .iter()
-            .zip(0_u32..)
-            .map(|(setpoint, tick)| TraceRow {
-                time_s: f64::from(tick) * TICK_S,
-                pose: pose(setpoint),
-            })
-            .collect();
         let box_s = shortest_box_s(&robot);
         let cut_mm = if box_s > 0.0 {
             400.0 * TICK_S * TICK_S / (2.0 * box_s)
         } else {
             400.0 * TICK_S / 2.0
         };
-        let used = tolerance_use(&parsed, &rows, tolerance_mm, (1e-3, cut_mm));
+        let used = tolerance_use(&parsed, &rows(&all), tolerance_mm, (1e-3, cut_mm));
         assert!(
             used.strayed <= 1.0 && used.missed <= 1.0,
             "seed {seed}, {tolerance_mm} mm, {:?}: {used:?}\n{program}",

@@ -233,13 +233,9 @@ impl Robot {
     fn take_config(&mut self, config: &RobotConfig) -> Result<Tuning, ConfigError> {
         check_ranges(config)?;
         let arm = arm(config)?;
-        let mut prefilter = config.prefilter;
-        add_boxes(&mut prefilter, config, &arm, config.automatic);
         let mut follower = None;
-        make_follower(&mut follower, config, &prefilter, config.automatic)?;
-        let tuning = first_tuning(&prefilter, follower.as_ref());
-        check_tuning(&tuning)?;
-        check_along(config, &arm, &config.prefilter)?;
+        let wanted = (&config.prefilter, config.automatic);
+        let tuning = take_follower(&mut follower, config, &arm, wanted)?;
         // nothing fails from here on
         self.config = *config;
         self.arm = arm;
@@ -262,7 +258,8 @@ impl Robot {
     pub fn set_prefilter(&mut self, config: &PrefilterConfig) -> Result<(), ConfigError> {
         let stays_automatic = self.stays_automatic(config);
         let mut follower = None;
-        let tuning = self.take_follower(&mut follower, config, stays_automatic)?;
+        let wanted = (config, stays_automatic);
+        let tuning = take_follower(&mut follower, &self.config, &self.arm, wanted)?;
         // nothing fails from here on
         self.along = AxisSet::ALL;
         self.follower = follower;
@@ -279,26 +276,9 @@ impl Robot {
     /// As [`Robot::set_prefilter`].
     #[inline(never)]
     pub fn check_prefilter(&self, config: &PrefilterConfig) -> Result<(), ConfigError> {
-        self.take_follower(&mut None, config, self.stays_automatic(config))?;
+        let wanted = (config, self.stays_automatic(config));
+        take_follower(&mut None, &self.config, &self.arm, wanted)?;
         Ok(())
-    }
-
-    /// Makes what follows the map in its place, and yields what the prefilter is made of at
-    /// first, once its settings are these.
-    #[inline(never)]
-    fn take_follower(
-        &self,
-        place: &mut Option<Follower>,
-        config: &PrefilterConfig,
-        automatic: bool,
-    ) -> Result<Tuning, ConfigError> {
-        let mut prefilter = *config;
-        add_boxes(&mut prefilter, &self.config, &self.arm, automatic);
-        make_follower(place, &self.config, &prefilter, automatic)?;
-        let tuning = first_tuning(&prefilter, place.as_ref());
-        check_tuning(&tuning)?;
-        check_along(&self.config, &self.arm, config)?;
-        Ok(tuning)
     }
 
     fn stays_automatic(&self, config: &PrefilterConfig) -> bool {
@@ -509,6 +489,24 @@ const fn limit_names(part: Part) -> &'static [&'static str; 3] {
         Part::Path => &["path-velocity", "path-acceleration", "path-jerk"],
         Part::Axis => &["axis-velocity", "axis-acceleration", "axis-jerk"],
     }
+}
+
+/// Makes what follows the map in its place, and yields what the prefilter is made of at first, once
+/// its settings are these and it is chosen automatically or not.
+#[inline(never)]
+fn take_follower(
+    place: &mut Option<Follower>,
+    robot: &RobotConfig,
+    arm: &Arm,
+    (config, automatic): (&PrefilterConfig, bool),
+) -> Result<Tuning, ConfigError> {
+    let mut prefilter = *config;
+    add_boxes(&mut prefilter, robot, arm, automatic);
+    make_follower(place, robot, &prefilter, automatic)?;
+    let tuning = first_tuning(&prefilter, place.as_ref());
+    check_tuning(&tuning)?;
+    check_along(robot, arm, config)?;
+    Ok(tuning)
 }
 
 /// Makes what chooses the prefilters of each move, if there is a map or a choice, for these

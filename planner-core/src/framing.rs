@@ -114,11 +114,23 @@ fn body(wire: &mut [u8]) -> Option<&[u8]> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     extern crate std;
     use super::*;
     use proptest::prelude::*;
     use std::vec::Vec;
+
+    /// Flips, drops and puts in bytes: where, what of that, and which.
+    pub(crate) fn damage_wire(wire: &mut Vec<u8>, damage: Vec<(usize, u8, u8)>) {
+        for (at, kind, byte) in damage {
+            let at = at % wire.len();
+            match kind {
+                0 => wire[at] ^= byte | 1,
+                1 => drop(wire.remove(at)),
+                _ => wire.insert(at, byte),
+            }
+        }
+    }
 
     const WIRE: usize = wire_bytes(20);
 
@@ -176,14 +188,7 @@ mod tests {
         ) {
             let body = |n: u8| std::vec![n; 20];
             let mut wire: Vec<u8> = (0..20).flat_map(|n| encode::<WIRE>(&body(n))).collect();
-            for (at, kind, byte) in damage {
-                let at = at % wire.len();
-                match kind {
-                    0 => wire[at] ^= byte | 1,
-                    1 => drop(wire.remove(at)),
-                    _ => wire.insert(at, byte),
-                }
-            }
+            damage_wire(&mut wire, damage);
             wire.push(0);
             wire.extend(encode::<WIRE>(&body(20)));
             let seen: Vec<_> = decoded(&wire).into_iter().flatten().collect();

@@ -258,6 +258,7 @@ impl FrameDecoder {
 mod tests {
     extern crate std;
     use super::*;
+    use crate::framing::tests::damage_wire;
     use proptest::prelude::*;
     use std::vec::Vec;
 
@@ -387,14 +388,7 @@ mod tests {
             damage in proptest::collection::vec((0_usize..FRAME_BYTES * 20, 0_u8..3, any::<u8>()), 0..12),
         ) {
             let mut wire: Vec<u8> = (0..20).flat_map(|n| frame(n).encode()).collect();
-            for (at, kind, byte) in damage {
-                let at = at % wire.len();
-                match kind {
-                    0 => wire[at] ^= byte | 1,
-                    1 => drop(wire.remove(at)),
-                    _ => wire.insert(at, byte),
-                }
-            }
+            damage_wire(&mut wire, damage);
             wire.push(0);
             wire.extend(frame(20).encode());
             let mut decoder = FrameDecoder::new();

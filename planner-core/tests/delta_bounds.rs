@@ -5,7 +5,7 @@ mod geometry;
 
 use std::f64::consts::TAU;
 
-use geometry::{Geometry, WORKSPACE, dot};
+use geometry::{Geometry, WORKSPACE, dot, sized};
 use planner_core::kinematics::{Delta, DeltaConfig, RateBounds, Sweep};
 use proptest::prelude::*;
 
@@ -74,19 +74,12 @@ fn somewhere() -> impl Strategy<Value = [f64; 3]> {
 /// Over the whole workspace of robots of several shapes: g and H are met, D within a factor.
 #[test]
 fn norms_bound_the_derivatives_and_are_met() {
-    let robot = |base, platform, arm, forearm| DeltaConfig {
-        base_radius_mm: base,
-        platform_radius_mm: platform,
-        upper_arm_mm: arm,
-        forearm_mm: forearm,
-        ..DeltaConfig::default()
-    };
     for (config, third) in [
         (DeltaConfig::default(), 1.8..2.1),
-        (robot(60.0, 20.0, 80.0, 210.0), 1.05..2.5),
-        (robot(50.0, 50.0, 300.0, 500.0), 1.05..3.0),
-        (robot(180.0, 45.0, 400.0, 420.0), 1.05..4.0),
-        (robot(200.0, 50.0, 500.0, 300.0), 1.05..4.0),
+        (sized(60.0, 20.0, 80.0, 210.0), 1.05..2.5),
+        (sized(50.0, 50.0, 300.0, 500.0), 1.05..3.0),
+        (sized(180.0, 45.0, 400.0, 420.0), 1.05..4.0),
+        (sized(200.0, 50.0, 500.0, 300.0), 1.05..4.0),
     ] {
         let (delta, geometry) = (Delta::new(&config).unwrap(), Geometry::of(&config));
         let reach = geometry.upper_arm + geometry.forearm;

@@ -3,7 +3,7 @@
 #[path = "support/delta.rs"]
 mod geometry;
 
-use geometry::{Geometry, WORKSPACE, dot, joints_f64, pose, pose_f64, workspace};
+use geometry::{Geometry, WORKSPACE, dot, joints_f64, pose, pose_f64, sized, workspace};
 use planner_core::kinematics::{Delta, DeltaConfig, DeltaError, JointRange, PoseError};
 use planner_core::pose::{JointPosition, Pose};
 use proptest::prelude::*;
@@ -18,19 +18,12 @@ fn of(config: &DeltaConfig) -> (Delta, Geometry) {
 
 /// Other robots of this kind: small, large, without an offset, with forearms as short as arms.
 fn robots() -> [DeltaConfig; 5] {
-    let robot = |base, platform, arm, forearm| DeltaConfig {
-        base_radius_mm: base,
-        platform_radius_mm: platform,
-        upper_arm_mm: arm,
-        forearm_mm: forearm,
-        ..DeltaConfig::default()
-    };
     [
         DeltaConfig::default(),
-        robot(60.0, 20.0, 80.0, 210.0),
-        robot(300.0, 100.0, 600.0, 1100.0),
-        robot(50.0, 50.0, 300.0, 500.0),
-        robot(180.0, 45.0, 400.0, 420.0),
+        sized(60.0, 20.0, 80.0, 210.0),
+        sized(300.0, 100.0, 600.0, 1100.0),
+        sized(50.0, 50.0, 300.0, 500.0),
+        sized(180.0, 45.0, 400.0, 420.0),
     ]
 }
 

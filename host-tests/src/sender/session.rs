@@ -49,6 +49,24 @@ pub struct Answer {
     pub settings: Vec<(String, String)>,
 }
 
+impl Answer {
+    /// Takes a line of it; whether it is the last one.
+    pub fn take(&mut self, reply: Reply) -> bool {
+        match reply {
+            Reply::Ok => return true,
+            Reply::Error(code) => {
+                self.error = Some(code);
+                return true;
+            }
+            Reply::Info(info) => self.info.push(info),
+            Reply::Message(message) => self.messages.push(message),
+            Reply::Setting { name, value } => self.settings.push((name, value)),
+            _ => {}
+        }
+        false
+    }
+}
+
 /// A connection, and what is known of the controller at its end.
 pub struct Session {
     connection: Connection,
@@ -185,16 +203,8 @@ impl Session {
         let mut answer = Answer::default();
         let start = Instant::now();
         while start.elapsed() < patience {
-            match self.hear()? {
-                Some(Reply::Ok) => return Ok(answer),
-                Some(Reply::Error(code)) => {
-                    answer.error = Some(code);
-                    return Ok(answer);
-                }
-                Some(Reply::Info(info)) => answer.info.push(info),
-                Some(Reply::Message(message)) => answer.messages.push(message),
-                Some(Reply::Setting { name, value }) => answer.settings.push((name, value)),
-                _ => {}
+            if self.hear()?.is_some_and(|reply| answer.take(reply)) {
+                return Ok(answer);
             }
         }
         let address = self.connection.address().clone();

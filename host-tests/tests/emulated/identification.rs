@@ -101,13 +101,7 @@ impl survey::Desk for Desk {
     fn ask(&mut self, line: &str) -> Result<Answer, Infallible> {
         let mut answer = Answer::default();
         for line in Self::ask(self, line).lines() {
-            match Reply::parse(line) {
-                Reply::Error(code) => answer.error = Some(code),
-                Reply::Info(info) => answer.info.push(info),
-                Reply::Message(message) => answer.messages.push(message),
-                Reply::Setting { name, value } => answer.settings.push((name, value)),
-                _ => {}
-            }
+            answer.take(Reply::parse(line));
         }
         Ok(answer)
     }

@@ -23,13 +23,7 @@ impl Desk for Bench<'_, '_> {
     fn ask(&mut self, line: &str) -> Result<Answer, Infallible> {
         let mut answer = Answer::default();
         for line in self.0.ask(line).lines() {
-            match Reply::parse(line) {
-                Reply::Error(code) => answer.error = Some(code),
-                Reply::Info(info) => answer.info.push(info),
-                Reply::Message(message) => answer.messages.push(message),
-                Reply::Setting { name, value } => answer.settings.push((name, value)),
-                _ => {}
-            }
+            answer.take(Reply::parse(line));
         }
         Ok(answer)
     }

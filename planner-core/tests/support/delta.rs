@@ -10,6 +10,17 @@ use planner_core::units::LengthMm;
 /// The workspace of [vNoorden21]: 797 × 797 × 228 mm.
 pub const WORKSPACE: [(f64, f64); 3] = [(-398.5, 398.5), (-398.5, 398.5), (-828.0, -600.0)];
 
+/// A robot of these radii and lengths, in millimetres.
+pub fn sized(base: f32, platform: f32, arm: f32, forearm: f32) -> DeltaConfig {
+    DeltaConfig {
+        base_radius_mm: base,
+        platform_radius_mm: platform,
+        upper_arm_mm: arm,
+        forearm_mm: forearm,
+        ..DeltaConfig::default()
+    }
+}
+
 /// The robot's geometry, in millimetres and radians.
 #[derive(Clone, Copy)]
 pub struct Geometry {
